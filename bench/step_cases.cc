@@ -9,12 +9,12 @@
 #include "field/field.h"
 #include "field/sampling/resample.h"
 #include "fit/domain.h"
-#include "fit/options.h"
 #include "kernels/adam.h"
 #include "kernels/lanes.h"
 #include "kernels/leaf_decoding.h"
 #include "kernels/total_variation.h"
 #include "measurement/view_residuals.h"
+#include "objective/constants.h"
 #include "projection/slab_sampler.h"
 
 namespace tomofield::bench {
@@ -25,11 +25,10 @@ using kernels::kLanes;
 constexpr int kThickness = 150;
 constexpr int kBand = 2;  // a band away from the edges
 
-fit::FieldOptions field_options(FieldKind kind) {
-  fit::FieldOptions options;
+FieldOptions field_options(FieldKind kind) {
+  FieldOptions options;
   options.kind = kind;
   options.leaf_size = fit::usual_leaf_size(options);
-  options.depth = fit::usual_depth(options);
   options.with_margin = false;
   return options;
 }
@@ -139,7 +138,6 @@ Case variation_case(const std::shared_ptr<StepSetup>& s) {
   return {.name = "step: total variation",
           .run =
               [s] {
-                const fit::FitOptions options;
                 const projection::SampleSegment& segment = s->domain.grid.segments()[0];
                 kernels::SlabVariation v;
                 v.samples = s->samples.data() + segment.origin;
@@ -152,8 +150,8 @@ Case variation_case(const std::shared_ptr<StepSetup>& s) {
                 v.above = {s->above.data(), segment.nz, 1};
                 v.flux = s->flux.data();
                 v.weight = 1e-6f;
-                v.penalty = {static_cast<float>(options.gradient_floor),
-                             static_cast<float>(options.concavity)};
+                v.penalty = {static_cast<float>(objective::kGradientFloor),
+                             static_cast<float>(objective::kConcavity)};
                 kernels::slab_variation(v);
               },
           .flops = 35 * s->num_samples(),
@@ -189,7 +187,7 @@ Case data_case(const std::shared_ptr<ProjectionSetup>& p) {
 
 std::vector<Case> step_cases() {
   const auto projection =
-      std::make_shared<ProjectionSetup>(kThickness, fit::FitOptions{}.subsets, kSlabsTogether);
+      std::make_shared<ProjectionSetup>(kThickness, FitOptions{}.subsets, kSlabsTogether);
   const auto step = std::make_shared<StepSetup>(FieldKind::kGrid);
   step->values.fill(0.1f);
   const auto decoding = std::make_shared<LeafDecoding>(*step);

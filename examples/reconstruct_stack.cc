@@ -12,10 +12,10 @@ int main(int argc, char** argv) try {
   files.stack = argv[1];
   files.tlt = argv[2];
   tomofield::Options options;
-  options.thickness = std::atof(argv[3]);
-  options.contrast = tomofield::Contrast::kBright;
-  options.with_margin = false;  // the specimen ends inside the field of view
-  options.output = argv[4];
+  options.specimen.thickness = std::atof(argv[3]);
+  options.views.contrast = tomofield::Contrast::kBright;
+  options.field.with_margin = false;  // the specimen ends inside the field of view
+  options.run.output = argv[4];
   const auto show = [](const tomofield::Progress& progress) {
     std::cerr << '\r' << static_cast<int>(100 * progress.fraction_done) << " %" << std::flush;
     return true;  // false stops the reconstruction

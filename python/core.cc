@@ -8,6 +8,7 @@
 #include <tomofield/evaluate.h>
 #include <tomofield/messages.h>
 #include <tomofield/model.h>
+#include <tomofield/project.h>
 #include <tomofield/reconstruct.h>
 #include <tomofield/version.h>
 
@@ -21,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+#include "option_table/rows.h"
 #include "options.h"
 
 namespace tomofield::python {
@@ -111,13 +113,48 @@ class Listener {
   std::exception_ptr raised_;
 };
 
-py::dict run(const TiltSeries& series, const Options& options, py::object callback) {
+// Passes messages to the logger "tomofield". Whatever says something runs without the interpreter's
+// lock, which is taken here: else two threads could wait for each other.
+void log(MessageKind kind, std::string_view text) {
+  const py::gil_scoped_acquire locked;
+  try {
+    const auto message = py::reinterpret_steal<py::object>(
+        PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "replace"));
+    const py::object logger = py::module_::import("logging").attr("getLogger")("tomofield");
+    logger.attr(kind == MessageKind::kWarning ? "warning" : "info")(message);
+  } catch (py::error_already_set& error) {
+    error.discard_as_unraisable("tomofield's logger");
+  }
+}
+
+// Reads a project, or takes the path of a stack. Its warnings go to the logger.
+option_table::Choices open(const std::filesystem::path& path, const std::string& series,
+                           const std::string& ignore) {
+  const Project project = open_project({path, series, ignore});
+  for (const std::string& warning : project.warnings) log(MessageKind::kWarning, warning);
+  return {project.files, project.options};
+}
+
+bool align_series(const TiltSeries& series, const option_table::Choices& choices,
+                  py::object callback) {
+  Listener listener(std::move(callback));
+  bool is_finished = false;
+  {
+    const py::gil_scoped_release unlocked;
+    is_finished = align(series, choices.options,
+                        [&](const Progress& progress) { return listener(progress); });
+  }
+  listener.rethrow();
+  return is_finished;
+}
+
+py::dict run(const TiltSeries& series, const option_table::Choices& choices, py::object callback) {
   Listener listener(std::move(callback));
   Reconstruction made;
   {
     const py::gil_scoped_release unlocked;
-    made =
-        reconstruct(series, options, [&](const Progress& progress) { return listener(progress); });
+    made = reconstruct(series, choices.options,
+                       [&](const Progress& progress) { return listener(progress); });
   }
   listener.rethrow();
   py::dict result;
@@ -155,23 +192,12 @@ py::array_t<float> sample_points(const Model& model, const py::object& rows) {
   return to_array(std::move(values), {points.shape(0)});
 }
 
-// Passes messages to the logger "tomofield". Whatever says something runs without the interpreter's
-// lock, which is taken here: else two threads could wait for each other.
-void log(MessageKind kind, std::string_view text) {
-  const py::gil_scoped_acquire locked;
-  try {
-    const auto message = py::reinterpret_steal<py::object>(
-        PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "replace"));
-    const py::object logger = py::module_::import("logging").attr("getLogger")("tomofield");
-    logger.attr(kind == MessageKind::kWarning ? "warning" : "info")(message);
-  } catch (py::error_already_set& error) {
-    error.discard_as_unraisable("tomofield's logger");
-  }
-}
-
 void add_reconstruct(py::module_& module) {
   py::class_<TiltSeries>(module, "TiltSeries")
-      .def_static("from_files", &TiltSeries::from_files)
+      .def_static("from_files",
+                  [](const option_table::Choices& choices) {
+                    return TiltSeries::from_files(choices.files);
+                  })
       .def_static("from_images", &series_of);
   py::class_<Progress>(module, "Progress", "How far a reconstruction is.")
       .def_readonly("fraction_done", &Progress::fraction_done, "from 0 to 1")
@@ -180,6 +206,8 @@ void add_reconstruct(py::module_& module) {
       .def_readonly("is_trial", &Progress::is_trial,
                     "True for trials that choose settings before the fit")
       .def_readonly("detail", &Progress::detail, "a few words: epoch, loss, steps a second");
+  module.def("open_project", &open);
+  module.def("align", &align_series);
   module.def("reconstruct", &run);
   module.def("set_thread_count", &set_thread_count);
 }

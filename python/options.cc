@@ -3,196 +3,112 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 #include <tomofield/error.h>
-#include <tomofield/options.h>
 
 #include <array>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "base/enum_names.h"
+#include "option_table/rows.h"
 
 namespace tomofield::python {
 namespace {
 
 namespace py = pybind11;
-using Class = py::class_<Options>;
+using option_table::Choices;
+using option_table::Reference;
+using option_table::Row;
+using Corners = std::array<std::int64_t, 4>;  // x0, y0, x1, y1
 
-// Names types as numpy does; the command line names the modes of MRC files.
-struct VoxelTypeNames {
-  static constexpr std::array kNames{std::pair{VoxelType::kFloat32, "float32"},
-                                     std::pair{VoxelType::kFloat16, "float16"},
-                                     std::pair{VoxelType::kInt16, "int16"}};
+// The types that stand for a value in Python: words for enums, and four numbers for a rectangle.
+// Each conversion is a function that overloading finds.
+
+template <typename T>
+requires(!std::is_enum_v<T>) T to_python(const T& value) { return value; }
+Corners to_python(const Rectangle& r) { return {r.x0, r.y0, r.x1, r.y1}; }
+template <typename Enum>
+requires std::is_enum_v<Enum> std::string to_python(Enum value) {
+  return option_table::python_name_of(value);
+}
+
+template <typename T>
+struct InPython {
+  using type = decltype(to_python(std::declval<T>()));
 };
 
-template <typename Names, typename Enum>
-std::string name_of(Enum value) {
-  for (const auto& [known, name] : Names::kNames)
-    if (known == value) return name;
-  return "";
-}
-
-template <typename Names, typename Enum>
-Enum value_named(const char* option, const std::string& name) {
-  std::string choices;
-  for (const auto& [value, choice] : Names::kNames) {
-    if (name == choice) return value;
-    choices += (choices.empty() ? "'" : ", '") + std::string(choice) + "'";
+template <typename T>
+T from_python(const Row& row, const typename InPython<T>::type& value) {
+  if constexpr (std::is_same_v<T, Rectangle>) {
+    return {value[0], value[1], value[2], value[3]};
+  } else if constexpr (std::is_enum_v<T>) {
+    std::string choices;
+    for (const auto& [known, _] : base::EnumNames<T>::kNames) {
+      const std::string name = option_table::python_name_of(known);
+      if (name == value) return known;
+      choices += (choices.empty() ? "'" : ", '") + name + "'";
+    }
+    throw Error("the option " + std::string(row.name) + " is one of " + choices + ", not '" +
+                value + "'");
+  } else {
+    return value;
   }
-  throw Error(std::string("the option ") + option + " is one of " + choices + ", not '" + name +
-              "'");
 }
 
-template <typename Enum, typename Names = base::EnumNames<Enum>>
-void add_choice(Class& options, const char* name, Enum Options::*member) {
-  options.def_property(
-      name, [member](const Options& o) { return name_of<Names>(o.*member); },
-      [name, member](Options& o, const std::string& word) {
-        o.*member = value_named<Names, Enum>(name, word);
-      });
+// A property with a value of its own, and one that is None while it is open or absent.
+
+template <typename T>
+void add_property(py::class_<Choices>& choices, const Row& row, Reference<T> member) {
+  using Value = typename InPython<T>::type;
+  choices.def_property(
+      row.name.data(), [member](Choices& c) { return to_python(member(c)); },
+      [member, &row](Choices& c, const Value& value) { member(c) = from_python<T>(row, value); });
 }
 
-template <typename Enum, typename Names = base::EnumNames<Enum>>
-void add_choice(Class& options, const char* name, std::optional<Enum> Options::*member) {
-  options.def_property(
-      name,
-      [member](const Options& o) {
-        return o.*member ? std::optional(name_of<Names>(*(o.*member))) : std::nullopt;
+template <typename T, typename Optional>
+void add_optional(py::class_<Choices>& choices, const Row& row, Reference<Optional> member) {
+  using Value = std::optional<typename InPython<T>::type>;
+  choices.def_property(
+      row.name.data(),
+      [member](Choices& c) -> Value {
+        const Optional& value = member(c);
+        return option_table::is_chosen(value) ? Value(to_python(*value)) : std::nullopt;
       },
-      [name, member](Options& o, const std::optional<std::string>& word) {
-        o.*member = word ? std::optional(value_named<Names, Enum>(name, *word)) : std::nullopt;
+      [member, &row](Choices& c, const Value& value) {
+        Choices usual;
+        member(c) = value ? Optional(from_python<T>(row, *value)) : member(usual);
       });
 }
 
-// x0, y0, x1, y1
-void add_rectangle(Class& options) {
-  using Corners = std::array<std::int64_t, 4>;
-  options.def_property(
-      "roi",
-      [](const Options& o) {
-        return o.roi ? std::optional(Corners{o.roi->x0, o.roi->y0, o.roi->x1, o.roi->y1})
-                     : std::nullopt;
-      },
-      [](Options& o, const std::optional<Corners>& c) {
-        o.roi = c ? std::optional(Rectangle{(*c)[0], (*c)[1], (*c)[2], (*c)[3]}) : std::nullopt;
-      });
+template <typename T>
+void add_property(py::class_<Choices>& choices, const Row& row,
+                  Reference<std::optional<T>> member) {
+  add_optional<T>(choices, row, member);
 }
-
-void add_files(py::module_& module) {
-  py::class_<SeriesFiles>(module, "SeriesFiles")
-      .def(py::init())
-      .def_readwrite("stack", &SeriesFiles::stack)
-      .def_readwrite("tlt", &SeriesFiles::tlt)
-      .def_readwrite("xf", &SeriesFiles::xf)
-      .def_readwrite("xtilt", &SeriesFiles::xtilt)
-      .def_readwrite("aln", &SeriesFiles::aln)
-      .def_readwrite("mdoc", &SeriesFiles::mdoc)
-      .def_readwrite("mask", &SeriesFiles::mask)
-      .def_readwrite("fiducials", &SeriesFiles::fiducials)
-      .def_readwrite("even", &SeriesFiles::even)
-      .def_readwrite("odd", &SeriesFiles::odd)
-      .def_readwrite("ctf", &SeriesFiles::ctf)
-      .def_readwrite("mtf", &SeriesFiles::mtf);
-}
-
-void add_views_and_specimen(Class& options) {
-  options.def_readwrite("tilt_offset_deg", &Options::tilt_offset_deg)
-      .def_readwrite("x_axis_tilt_deg", &Options::x_axis_tilt_deg)
-      .def_readwrite("tilt_axis_deg", &Options::tilt_axis_deg)
-      .def_readwrite("exclude", &Options::exclude)
-      .def_readwrite("ignore", &Options::ignore)
-      .def_readwrite("bin", &Options::bin)
-      .def_readwrite("angpix", &Options::angpix)
-      .def_readwrite("pixel_size_A", &Options::pixel_size_A)
-      .def_readwrite("take_log", &Options::take_log)
-      .def_readwrite("log_base", &Options::log_base)
-      .def_readwrite("black_level", &Options::black_level)
-      .def_readwrite("bead_diameter_nm", &Options::bead_diameter_nm)
-      .def_readwrite("remove_fixed_pattern", &Options::remove_fixed_pattern)
-      .def_readwrite("thickness", &Options::thickness)
-      .def_readwrite("hand", &Options::hand)
-      .def_readwrite("axis_x", &Options::axis_x)
-      .def_readwrite("axis_z", &Options::axis_z)
-      .def_readwrite("shift_z", &Options::shift_z)
-      .def_readwrite("with_margin", &Options::with_margin);
-  add_choice(options, "contrast", &Options::contrast);
-  add_rectangle(options);
-}
-
-void add_contrast_transfer(Class& options) {
-  options.def_readwrite("defocus_um", &Options::defocus_um)
-      .def_readwrite("is_phase_flipped", &Options::is_phase_flipped)
-      .def_readwrite("defocus_hand", &Options::defocus_hand)
-      .def_readwrite("voltage_kV", &Options::voltage_kV)
-      .def_readwrite("spherical_aberration_mm", &Options::spherical_aberration_mm)
-      .def_readwrite("amplitude_contrast", &Options::amplitude_contrast)
-      .def_readwrite("dose_per_tilt", &Options::dose_per_tilt)
-      .def_readwrite("is_dose_weighted", &Options::is_dose_weighted);
-}
-
-void add_field_and_fit(Class& options) {
-  options.def_readwrite("leaf_size", &Options::leaf_size)
-      .def_readwrite("leaf_budget", &Options::leaf_budget)
-      .def_readwrite("vertex_spacing", &Options::vertex_spacing)
-      .def_readwrite("rank", &Options::rank)
-      .def_readwrite("margin_spacing", &Options::margin_spacing)
-      .def_readwrite("budget", &Options::budget)
-      .def_readwrite("tile_rows", &Options::tile_rows)
-      .def_readwrite("epochs", &Options::epochs)
-      .def_readwrite("vertex_epochs", &Options::vertex_epochs)
-      .def_readwrite("coarse_epochs", &Options::coarse_epochs)
-      .def_readwrite("coarse_bin", &Options::coarse_bin)
-      .def_readwrite("subsets", &Options::subsets)
-      .def_readwrite("ray_samples", &Options::ray_samples)
-      .def_readwrite("rays_per_step", &Options::rays_per_step)
-      .def_readwrite("learning_rate", &Options::learning_rate)
-      .def_readwrite("density_variation", &Options::density_variation)
-      .def_readwrite("denoise", &Options::denoise)
-      .def_readwrite("factor_variation", &Options::factor_variation)
-      .def_readwrite("boundary", &Options::boundary)
-      .def_readwrite("fourier", &Options::fourier)
-      .def_readwrite("spike_rank", &Options::spike_rank)
-      .def_readwrite("fit_noise", &Options::fit_noise)
-      .def_readwrite("fit_view_scale", &Options::fit_view_scale)
-      .def_readwrite("hold_out", &Options::hold_out)
-      .def_readwrite("tune", &Options::tune)
-      .def_readwrite("patience", &Options::patience)
-      .def_readwrite("seed", &Options::seed);
-  add_choice(options, "align", &Options::align);
-  add_choice(options, "field", &Options::field);
-  add_choice(options, "tree", &Options::tree);
-  add_choice(options, "activation", &Options::activation);
-  add_choice(options, "engine", &Options::engine);
-  add_choice(options, "penalty", &Options::penalty);
-  add_choice(options, "prior", &Options::prior);
-  add_choice(options, "fourier_ring", &Options::fourier_ring);
-  add_choice(options, "noise_model", &Options::noise_model);
-}
-
-void add_halves_volume_and_run(Class& options) {
-  options.def_readwrite("split_tilts", &Options::split_tilts)
-      .def_readwrite("denoising_halves", &Options::denoising_halves)
-      .def_readwrite("invert", &Options::invert)
-      .def_readwrite("zarr", &Options::zarr)
-      .def_readwrite("output", &Options::output)
-      .def_readwrite("overwrite", &Options::overwrite)
-      .def_readwrite("resume", &Options::resume)
-      .def_readwrite("checkpoint_minutes", &Options::checkpoint_minutes)
-      .def_readwrite("alignment_json", &Options::alignment_json);
-  add_choice<VoxelType, VoxelTypeNames>(options, "voxel_type", &Options::voxel_type);
-  add_choice(options, "axes", &Options::axes);
+template <typename T>
+void add_property(py::class_<Choices>& choices, const Row& row, Reference<Choice<T>> member) {
+  add_optional<T>(choices, row, member);
 }
 
 }  // namespace
 
 void add_options(py::module_& module) {
-  add_files(module);
-  Class options(module, "Options");
-  options.def(py::init());
-  add_views_and_specimen(options);
-  add_contrast_transfer(options);
-  add_field_and_fit(options);
-  add_halves_volume_and_run(options);
+  py::class_<Choices> choices(module, "Choices");
+  choices.def(py::init());
+  choices.def("copy", [](const Choices& c) { return c; });
+  choices.def_property_readonly("settings", [](const Choices& c) {
+    py::list settings;
+    for (const Setting& s : c.options.settings)
+      settings.append(py::make_tuple(s.option, s.value, s.file, s.entry));
+    return settings;
+  });
+  py::list files;
+  for (const Row& row : option_table::all_rows()) {
+    std::visit([&](auto member) { add_property(choices, row, member); }, row.member);
+    if (row.section == "files") files.append(std::string(row.name));
+  }
+  module.attr("FILES") = py::tuple(files);
 }
 
 }  // namespace tomofield::python

@@ -4,8 +4,8 @@
 
 namespace tomofield::python {
 
-/// Adds SeriesFiles and Options to the module. Their attributes are named as the members in C++;
-/// enums are the words of the command line.
+/// Adds Choices to the module, whose attributes are the options of the table by their names. Enums
+/// are words, and options that nobody chose are None. FILES lists those that are files.
 void add_options(pybind11::module_& module);
 
 }  // namespace tomofield::python

@@ -71,11 +71,10 @@ std::vector<double> tilts(double from, double to, double step) {
   return result;
 }
 
-fit::FieldOptions small_field(FieldKind kind) {
-  fit::FieldOptions options;
+FieldOptions small_field(FieldKind kind) {
+  FieldOptions options;
   options.kind = kind;
   options.rank = 6;
-  options.initial_scale = kind == FieldKind::kVm ? 0.1 : 0.0;
   return options;
 }
 

@@ -43,6 +43,6 @@ class BeadSeries {
 std::vector<double> tilts(double from, double to, double step);
 
 /// Returns the options of a small field of a kind.
-fit::FieldOptions small_field(FieldKind kind);
+FieldOptions small_field(FieldKind kind);
 
 }  // namespace tomofield::testing

@@ -88,7 +88,7 @@ class ShiftedSeries {
   std::int64_t size_;
   double noise_;
   GaussianScene scene_;
-  measurement::SpecimenOptions specimen_;
+  SpecimenOptions specimen_;
   std::vector<double> tilt_deg_;
   std::vector<ViewCorrection> right_;
   std::vector<float> pixels_;

@@ -26,10 +26,10 @@ class SmallFit {
   }
   std::unique_ptr<fit::Fit> make() const { return make(field_); }
   /// Makes a fit with another field.
-  std::unique_ptr<fit::Fit> make(const fit::FieldOptions& field) const {
+  std::unique_ptr<fit::Fit> make(const FieldOptions& field) const {
     return std::make_unique<fit::Fit>(measurement_, field, fit_);
   }
-  const fit::FieldOptions& field() const { return field_; }
+  const FieldOptions& field() const { return field_; }
   const output::ModelInfo& info() const { return info_; }
 
  private:
@@ -39,8 +39,8 @@ class SmallFit {
                                         .rays = series_.rays,
                                         .noise_sigma = series_.noise_sigma,
                                         .mean_density = 0.1};
-  fit::FieldOptions field_;
-  fit::FitOptions fit_;
+  FieldOptions field_;
+  FitOptions fit_;
   output::ModelInfo info_;
 };
 

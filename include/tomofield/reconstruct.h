@@ -53,7 +53,7 @@ using ProgressCallback = std::function<bool(const Progress&)>;
 struct Reconstruction {
   bool is_finished = false;  ///< false: the callback stopped it, and the rest is empty
   /// The density in the units and the contrast of the views, or in the other contrast with
-  /// Options::invert. It is there only if Options::output is empty.
+  /// VolumeOptions::invert. It is there only if RunOptions::output is empty.
   std::optional<Tomogram> tomogram;
   std::optional<Model> model;  ///< halves have none: their models are files beside the tomogram
   std::string metrics;         ///< JSON: what `tomofield reconstruct` writes beside the volume
@@ -62,13 +62,12 @@ struct Reconstruction {
 /// Fits a density field to a tilt series and samples it as a tomogram: the whole job of
 /// `tomofield reconstruct`, with the same defaults and the same bits.
 ///
-/// With Options::output, it writes the tomogram, the model (.h5) and the metrics (.json) there and
-/// leaves the tomogram out of the result. Only the command line draws pictures of slices, masks and
-/// trees. A run that the callback stops leaves a checkpoint, from which Options::resume continues.
+/// With RunOptions::output, it writes the tomogram, the model (.h5), the metrics (.json), pictures
+/// and the report there, and leaves the tomogram out of the result. A run that the callback stops
+/// leaves a checkpoint, from which RunOptions::resume continues.
 ///
-/// Without Options::output, it writes nothing but a scratch file in the temporary folder for views
-/// that do not fit in memory. Options::voxel_type, axes, overwrite and checkpoint_minutes have no
-/// effect then.
+/// Without RunOptions::output, it writes nothing but a scratch file in the temporary folder for
+/// views that do not fit in memory. The type and the axes of the volume have no effect then.
 ///
 /// It works on all threads (set_thread_count()). Calls from several threads run one after another.
 /// No Model may be opened from a file at the same time, since HDF5 is not thread-safe.
@@ -76,6 +75,11 @@ struct Reconstruction {
 /// Throws Error for options or files that cannot be used, and for too little memory.
 Reconstruction reconstruct(const TiltSeries& series, const Options& options,
                            const ProgressCallback& progress = {});
+
+/// Aligns the views with each other, as `tomofield align` does with the same options: it writes the
+/// alignment for IMOD, AreTomo and RELION beside RunOptions::output, and no tomogram. Returns false
+/// if the callback stopped it. Throws Error as reconstruct() does, and for RunOptions::align off.
+bool align(const TiltSeries& series, const Options& options, const ProgressCallback& progress = {});
 
 /// Sets the number of threads that the library computes with. 0, the default, means OMP_NUM_THREADS
 /// or else the processors that this process may use. Results have the same bits for any number.

@@ -10,7 +10,8 @@ import json
 import os
 import pathlib
 from dataclasses import dataclass
-from typing import Any, Callable, Dict, Optional, Sequence, Tuple, Union, Unpack
+from typing import (Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union,
+                    Unpack)
 
 import numpy as np
 import numpy.typing as npt
@@ -19,9 +20,9 @@ from . import _core
 from ._core import Error, Progress, ShellCorrelation, VolumeScores, __version__
 from .options import Options
 
-__all__ = ["Box", "Error", "Model", "Options", "Progress", "Reconstruction", "ShellCorrelation",
-           "VolumeScores", "__version__", "correlate_shells", "read_metrics", "reconstruct",
-           "score_volume", "set_thread_count"]
+__all__ = ["Box", "Error", "Model", "Options", "Progress", "Project", "Reconstruction", "Setting",
+           "ShellCorrelation", "VolumeScores", "__version__", "align", "correlate_shells",
+           "open_project", "read_metrics", "reconstruct", "score_volume", "set_thread_count"]
 
 Path = Union[str, "os.PathLike[str]"]
 Array = npt.NDArray[np.float32]
@@ -100,78 +101,109 @@ class Reconstruction:
     metrics: Dict[str, Any]
 
 
-def reconstruct(
-    series: Union[Path, npt.ArrayLike],
-    tilt_deg: Optional[Sequence[float]] = None,
-    *,
-    tlt: Optional[Path] = None,
-    xf: Optional[Path] = None,
-    xtilt: Optional[Path] = None,
-    aln: Optional[Path] = None,
-    mdoc: Optional[Path] = None,
-    mask: Optional[Path] = None,
-    fiducials: Optional[Path] = None,
-    even: Optional[Path] = None,
-    odd: Optional[Path] = None,
-    ctf: Optional[Path] = None,
-    mtf: Optional[Path] = None,
-    progress: Optional[Callable[[Progress], Optional[bool]]] = None,
-    **options: Unpack[Options],
-) -> Reconstruction:
+class Setting(NamedTuple):
+    """An option that a file of another program set: "--thickness", "300", tilt.com, "THICKNESS"."""
+
+    option: str
+    value: str
+    file: pathlib.Path
+    entry: str
+
+
+class Project:
+    """A tilt series as eTomo, AreTomo, RELION 5, Warp or SerialEM describe it, from open_project()."""
+
+    def __init__(self, core: Any) -> None:
+        self._core = core
+
+    @property
+    def settings(self) -> List[Setting]:
+        """Return what its files set, each with the file and the entry."""
+        return [Setting(*setting) for setting in self._core.settings]
+
+    def __getattr__(self, name: str) -> Any:
+        """Return the value of an option (tomofield.Options), or None if nobody chose it."""
+        if name.startswith("_") or name not in {"stack", *Options.__annotations__}:
+            raise AttributeError(name)
+        return getattr(self._core, name)
+
+
+Series = Union[Path, Project, npt.ArrayLike]
+Callback = Callable[[Progress], Optional[bool]]
+
+
+def open_project(path: Path, *, series: str = "", ignore: str = "") -> Project:
+    """Read a project of another program, as the command line does.
+
+    path: its main file or folder. The path of a stack gives the stack alone.
+    series: the name of one series of a project that has several.
+    ignore: entries of its files that are not applied, as in "LOCALFILE,LOG".
+    """
+    return Project(_core.open_project(os.fspath(path), series, ignore))
+
+
+def reconstruct(series: Series, tilt_deg: Optional[Sequence[float]] = None, *,
+                progress: Optional[Callback] = None,
+                **options: Unpack[Options]) -> Reconstruction:
     """Reconstruct a tomogram from a tilt series, with the defaults of the command line.
 
-    series: the path of an MRC stack, or views in memory as an array [view, y, x] whose tilt axis
-        runs along y through the image centre.
+    series: the path of a stack or of a project, a project, or views in memory as an array
+        [view, y, x] whose tilt axis runs along y through the image centre.
     tilt_deg: an angle a view, for views in memory.
-    tlt, xf, xtilt, aln, mdoc, mask, fiducials: files that belong to an MRC stack.
-    ctf: a table of the defocus of each view, from CTFFIND, AreTomo, IMOD, RELION, Gctf or Warp.
-    mtf: a STAR file with the modulation transfer function of the detector.
-    even, odd: MRC stacks of the even and the odd frames, for a reconstruction in halves. Its models
-        are files beside the tomogram, so `model` is None.
     progress: called after every step; returns False to stop.
-    options: see tomofield.Options. `thickness` is required. With `output`, the tomogram, the model
-        and the metrics are written as files; without it, nothing is written.
+    options: see tomofield.Options. They go over those of a project. `thickness` is required. With
+        `even` and `odd`, the models are files beside the tomogram, so `model` is None. With
+        `output`, all results are written as files; without it, nothing is written.
 
     KeyboardInterrupt stops it too; with `output`, both leave a checkpoint for `resume=True`.
     """
-    files = {"tlt": tlt, "xf": xf, "xtilt": xtilt, "aln": aln, "mdoc": mdoc, "mask": mask,
-             "fiducials": fiducials, "even": even, "odd": odd, "ctf": ctf, "mtf": mtf}
-    made = _core.reconstruct(_series(series, tilt_deg, files), _options(options), progress)
+    choices, core = _inputs(series, tilt_deg, options)
+    made = _core.reconstruct(core, choices, progress)
     return Reconstruction(
         made["is_finished"], made["tomogram"],
         None if made["model"] is None else Model._of(made["model"]),
         json.loads(made["metrics"]) if made["is_finished"] else {})
 
 
-def _series(series: Any, tilt_deg: Optional[Sequence[float]],
-            files: Dict[str, Optional[Path]]) -> Any:
-    given = {name: path for name, path in files.items() if path is not None}
+def align(series: Series, tilt_deg: Optional[Sequence[float]] = None, *,
+          progress: Optional[Callback] = None, **options: Unpack[Options]) -> bool:
+    """Align the views of a tilt series with each other, as `tomofield align` does.
+
+    The arguments are those of reconstruct(); `align` is "refine" unless it is given. The files for
+    other programs are written beside `output`, which is not written itself. Returns False if the
+    callback stopped it.
+    """
+    choices, core = _inputs(series, tilt_deg, {"align": "refine", **options})
+    return _core.align(core, choices, progress)
+
+
+def _inputs(series: Any, tilt_deg: Optional[Sequence[float]],
+            given: Dict[str, Any]) -> Tuple[Any, Any]:
     if isinstance(series, (str, os.PathLike)):
+        series = open_project(series, ignore=given.get("ignore", ""))
+    if isinstance(series, Project):
         if tilt_deg is not None:
             raise Error("tilt_deg is for views in memory: give the angles of a file with tlt")
-        core = _core.SeriesFiles()
-        core.stack = os.fspath(series)
-        for name, path in given.items():
-            setattr(core, name, os.fspath(path))
-        return _core.TiltSeries.from_files(core)
-    if given:
-        raise Error(f"{', '.join(given)} cannot be combined with views in memory: give the path of "
+        choices = _chosen(series._core.copy(), given)
+        return choices, _core.TiltSeries.from_files(choices)
+    files = [name for name in _core.FILES if given.get(name) is not None]
+    if files:
+        raise Error(f"{', '.join(files)} cannot be combined with views in memory: give the path of "
                     "an MRC stack")
     if tilt_deg is None:
         raise Error("views in memory need tilt_deg, an angle a view")
-    return _core.TiltSeries.from_images(series, tilt_deg)
+    return _chosen(_core.Choices(), given), _core.TiltSeries.from_images(series, tilt_deg)
 
 
-def _options(chosen: Dict[str, Any]) -> Any:
-    core = _core.Options()
-    for name, value in chosen.items():
+def _chosen(choices: Any, given: Dict[str, Any]) -> Any:
+    for name, value in given.items():
         if name not in Options.__annotations__:
             raise TypeError(f"reconstruct() has no option '{name}'")
         try:
-            setattr(core, name, value)
+            setattr(choices, name, value)
         except TypeError:
             raise TypeError(f"the option {name} cannot be {value!r}") from None
-    return core
+    return choices
 
 
 def read_metrics(path: Path) -> Dict[str, Any]:

@@ -1,3 +1,4 @@
+# Made by build/release/options_markdown --python from src/option_table/rows.cc: change that file.
 """The options of a reconstruction, as keyword arguments of tomofield.reconstruct()."""
 
 import os
@@ -9,16 +10,24 @@ _Path = Union[str, "os.PathLike[str]"]
 class Options(TypedDict, total=False):
     """Everything that a user can choose; docs/options.md lists units, ranges and defaults.
 
-    Options that may be None are chosen from the data or from the other options. Lengths on the
-    specimen are unbinned pixels of the aligned view; lengths of the field are binned pixels.
+    Options that may be None are chosen from the data or from the other options unless they are
+    given. Lengths on the specimen are unbinned pixels of the aligned view; lengths of the field are
+    binned pixels.
     """
 
-    # Views
+    # Tilt angles and alignment
+    tlt: Optional[_Path]
+    xf: Optional[_Path]
+    xtilt: Optional[_Path]
+    aln: Optional[_Path]
+    mdoc: Optional[_Path]
     tilt_offset_deg: float
     x_axis_tilt_deg: float
-    tilt_axis_deg: float | None
+    tilt_axis_deg: Optional[float]
     exclude: str
     ignore: str
+
+    # Images
     bin: float
     angpix: Optional[float]
     pixel_size_A: Optional[float]
@@ -26,13 +35,19 @@ class Options(TypedDict, total=False):
     take_log: bool
     log_base: float
     black_level: Optional[float]
+
+    # Masks
     bead_diameter_nm: Optional[float]
     remove_fixed_pattern: bool
+    fiducials: Optional[_Path]
+    mask: Optional[_Path]
 
     # Contrast transfer and dose
+    ctf: Optional[_Path]
     defocus_um: Optional[float]
     is_phase_flipped: bool
     defocus_hand: Optional[Literal[1, -1]]
+    mtf: Optional[_Path]
     voltage_kV: Optional[float]
     spherical_aberration_mm: Optional[float]
     amplitude_contrast: Optional[float]
@@ -41,7 +56,7 @@ class Options(TypedDict, total=False):
 
     # Specimen
     thickness: float
-    roi: Optional[Tuple[int, int, int, int]]  # x0, y0, x1, y1
+    roi: Optional[Tuple[int, int, int, int]]
     hand: Literal[1, -1]
     axis_x: Optional[float]
     axis_z: Optional[float]
@@ -54,13 +69,13 @@ class Options(TypedDict, total=False):
     tree: Literal["uniform", "adaptive"]
     leaf_budget: int
     vertex_spacing: float
-    rank: int
+    rank: Optional[int]
     activation: Optional[Literal["softplus", "identity"]]
-    margin_spacing: float
     budget: str
     tile_rows: Optional[int]
 
     # Fit
+    align: Literal["off", "refine", "full"]
     epochs: Optional[int]
     vertex_epochs: Optional[int]
     coarse_epochs: Optional[int]
@@ -70,35 +85,37 @@ class Options(TypedDict, total=False):
     ray_samples: int
     rays_per_step: int
     learning_rate: Optional[float]
+    denoise: str
     density_variation: Optional[float]
     factor_variation: float
     penalty: Optional[Literal["concave", "smooth"]]
     prior: Optional[Literal["tv", "light", "learned"]]
-    denoise: str
     boundary: float
     fourier: float
     fourier_ring: Literal["mean", "max"]
-    spike_rank: int | None
+    spike_rank: Optional[int]
     fit_noise: bool
     noise_model: Literal["white", "coloured"]
     fit_view_scale: Optional[bool]
+    margin_spacing: float
     hold_out: int
     tune: bool
     patience: int
     seed: int
 
-    # Alignment
-    align: Literal["off", "refine", "full"]
-
-    # Halves
-    split_tilts: bool
-    denoising_halves: bool
-
-    # Volume and run
+    # Volume
     voxel_type: Literal["float32", "float16", "int16"]
     axes: Literal["xyz", "xzy"]
     invert: bool
     zarr: bool
+
+    # Halves
+    even: Optional[_Path]
+    odd: Optional[_Path]
+    split_tilts: bool
+    denoising_halves: bool
+
+    # Running
     output: _Path
     overwrite: bool
     resume: bool

@@ -11,6 +11,7 @@
 #include "base/stopwatch.h"
 #include "base/threads/parallel.h"
 #include "measurement/prepare.h"
+#include "objective/constants.h"
 
 namespace tomofield::align {
 namespace {
@@ -101,18 +102,17 @@ double inner_squares(const ImagePair& images, const measurement::ViewModel& mode
 
 }  // namespace
 
-fit::FieldOptions aligning_field(fit::FieldOptions field) {
+FieldOptions aligning_field(FieldOptions field) {
   field.kind = FieldKind::kGrid;
   field.tree = TreeKind::kUniform;
   field.vertex_spacing = std::max(field.vertex_spacing, 1.0);
   field.leaf_size = fit::usual_leaf_size(field);
-  field.depth = fit::usual_depth(field);
   return field;
 }
 
-fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t seed) {
+FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t seed) {
   constexpr double kStiffness = 2.0, kLearningRate = 0.035;
-  fit::FitOptions options;
+  FitOptions options;
   options.seed = seed;
   options.penalty = Penalty::kSmooth;
   options.density_variation = kStiffness * objective::usual_variation(options.penalty);
@@ -145,7 +145,7 @@ void run_with_wide_pixels(fit::Fit& fit, int coarse_epochs, const JointProblem& 
 
 measurement::Measurement aligning_measurement(const JointProblem& problem,
                                               std::span<const geometry::ViewCorrection> corrections,
-                                              int bin, const fit::FieldOptions& field,
+                                              int bin, const FieldOptions& field,
                                               const distributed::Communicator& processes) {
   measurement::Measurement prepared = problem.plan;
   measurement::realign(problem.recorded, corrections, bin, problem.scratch_dir,

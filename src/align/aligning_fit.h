@@ -11,20 +11,20 @@
 #include "align/registration.h"
 #include "distributed/communicator.h"
 #include "fit/fit.h"
-#include "fit/options.h"
 #include "fit/stages.h"
 #include "measurement/held_out.h"
 #include "measurement/measurement.h"
+#include "tomofield/options.h"
 
 namespace tomofield::align {
 
 /// Returns the options of a field of plain vertices that serves to align views, like the field of a
 /// reconstruction in all else.
-fit::FieldOptions aligning_field(fit::FieldOptions field);
+FieldOptions aligning_field(FieldOptions field);
 
 /// Returns the options of a fit that serves to align views. The field is stiff, because a soft one
 /// blurs until it explains wrong shifts.
-fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t seed);
+FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t seed);
 
 /// Throws base::StopRequested in every process if any of them was asked to stop.
 void check_stop(const JointProblem& problem, const distributed::Communicator& processes);
@@ -43,7 +43,7 @@ void run_with_wide_pixels(fit::Fit& fit, int coarse_epochs, const JointProblem& 
 /// pixels are at least `bin` times as wide.
 measurement::Measurement aligning_measurement(const JointProblem& problem,
                                               std::span<const geometry::ViewCorrection> corrections,
-                                              int bin, const fit::FieldOptions& field,
+                                              int bin, const FieldOptions& field,
                                               const distributed::Communicator& processes);
 
 /// Returns a view and its prediction by a fit in one of its stages, with their place in the aligned
@@ -74,7 +74,7 @@ std::vector<double> inner_residuals(const fit::Fit& fit,
 /// A fit and the alignment of the views that it is made with.
 struct FitInProgress {
   const JointProblem& problem;
-  const fit::FieldOptions& field;
+  const FieldOptions& field;
   const std::vector<geometry::ViewCorrection>& corrections;
   const std::vector<double>& steps_px;  ///< root mean square of each update so far
   measurement::Measurement& measurement;

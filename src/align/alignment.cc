@@ -82,7 +82,7 @@ void require_views(std::size_t num_views) {
                     kFewestViews, num_views));
 }
 
-fit::FieldOptions planned_field(const fit::FieldOptions& field) { return aligning_field(field); }
+FieldOptions planned_field(const FieldOptions& field) { return aligning_field(field); }
 
 std::size_t memory_beside_fit(const measurement::Measurement& plan) {
   return prediction_memory(plan);

@@ -40,7 +40,7 @@ struct Alignment {
 
 /// Fits of an alignment: the first epochs of a fit, several times.
 struct PlannedFits {
-  fit::FitOptions options;
+  FitOptions options;
   std::int64_t epochs;
   int times;
   /// Time of resampling and registering a view in all updates of a fit, most of which have wide
@@ -49,7 +49,7 @@ struct PlannedFits {
 };
 
 /// Returns the field of the fits of an alignment, for a field that the reconstruction asks for.
-fit::FieldOptions planned_field(const fit::FieldOptions& field);
+FieldOptions planned_field(const FieldOptions& field);
 /// Returns the fits that an alignment makes, without that for local motion. `from_raw`: with the
 /// search for the tilt axis.
 std::vector<PlannedFits> planned_fits(const measurement::Measurement& plan, bool from_raw,

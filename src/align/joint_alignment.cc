@@ -76,8 +76,8 @@ class AligningFit {
  private:
   // Returns the options of the fit. Scales of the views hide errors of shifts that vary slowly over
   // the tilts, so they are left out where they are not needed.
-  fit::FitOptions fit_options(bool may_scale) const {
-    fit::FitOptions options = joint_fit(problem_.seed);
+  FitOptions fit_options(bool may_scale) const {
+    FitOptions options = joint_fit(problem_.seed);
     options.fit_view_scale = may_scale && exposures_differ(measurement_, processes_);
     return options;
   }
@@ -203,7 +203,7 @@ class AligningFit {
 
   const JointProblem& problem_;
   const distributed::Communicator& processes_;
-  fit::FieldOptions field_;
+  FieldOptions field_;
   measurement::Measurement measurement_;
   fit::Fit fit_;
   Relaxation relaxation_;
@@ -214,7 +214,7 @@ class AligningFit {
 
 }  // namespace
 
-fit::FitOptions joint_fit(std::uint64_t seed) {
+FitOptions joint_fit(std::uint64_t seed) {
   constexpr int kCoarseEpochs = 80, kFineEpochs = 3;
   return aligning_fit(kCoarseEpochs, kFineEpochs, seed);
 }

@@ -11,10 +11,10 @@
 #include "align/start/slab_pose.h"
 #include "base/progress.h"
 #include "distributed/communicator.h"
-#include "fit/options.h"
 #include "geometry/view_correction.h"
 #include "measurement/measurement.h"
 #include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::align {
 
@@ -45,7 +45,7 @@ struct JointProblem {
   const tilt_series::TiltSeries& recorded;  ///< views that are not resampled, and keep their pixels
   /// Everything of the measurement but its rays (measurement::plan_realigned).
   measurement::Measurement plan;
-  fit::FieldOptions field;  ///< its kind is replaced by plain vertices
+  FieldOptions field;  ///< its kind is replaced by plain vertices
   std::uint64_t seed = 1;
   const std::filesystem::path& scratch_dir;
   base::ProgressSink progress;
@@ -53,7 +53,7 @@ struct JointProblem {
 };
 
 /// Returns the options of the fit of align_jointly().
-fit::FitOptions joint_fit(std::uint64_t seed);
+FitOptions joint_fit(std::uint64_t seed);
 
 /// Number of epochs of the fit of coarse_residuals(): the first ones of joint_fit().
 inline constexpr std::int64_t kResidualEpochs = 15;

@@ -38,7 +38,7 @@ Comparison compare_errors(const std::vector<double>& before, const std::vector<d
 
 }  // namespace
 
-fit::FitOptions held_out_fit(std::uint64_t seed) {
+FitOptions held_out_fit(std::uint64_t seed) {
   return aligning_fit(kHeldOutCoarseEpochs, kFineEpochs, seed);
 }
 

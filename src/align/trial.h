@@ -8,14 +8,14 @@
 #include "align/mean_gain.h"
 #include "distributed/communicator.h"
 #include "fit/fit.h"
-#include "fit/options.h"
 #include "geometry/view_correction.h"
 #include "measurement/measurement.h"
+#include "tomofield/options.h"
 
 namespace tomofield::align {
 
 /// Returns the options of the fit of an AlignmentTrial.
-fit::FitOptions held_out_fit(std::uint64_t seed);
+FitOptions held_out_fit(std::uint64_t seed);
 
 /// Number of epochs of that fit with wide pixels.
 inline constexpr int kHeldOutCoarseEpochs = 24;
@@ -45,7 +45,7 @@ class AlignmentTrial {
   const JointProblem& problem_;
   const distributed::Communicator& processes_;
   std::vector<geometry::ViewCorrection> corrections_;
-  fit::FieldOptions field_;
+  FieldOptions field_;
   measurement::Measurement measurement_;
   std::unique_ptr<fit::Fit> fit_;
   std::vector<double> coarse_errors_, fine_errors_;

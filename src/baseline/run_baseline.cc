@@ -23,9 +23,11 @@
 #include "measurement/held_out.h"
 #include "measurement/undecided_beads.h"
 #include "measurement/view_transfers.h"
+#include "option_table/setting.h"
 #include "option_table/values.h"
 #include "output/metrics.h"
 #include "output/shared_options.h"
+#include "output/volume.h"
 #include "projection/sample_grid.h"
 #include "tomofield/error.h"
 #include "tune/trial_measurement.h"
@@ -39,13 +41,13 @@ projection::SampleGrid grid_of(const measurement::Measurement& series,
                                const BaselineOptions& options) {
   return projection::make_sample_grid(
       series.geometry, static_cast<double>(series.roi.x0), static_cast<double>(series.roi.x1),
-      options.shared.with_margin ? options.shared.margin_spacing : 0.0);
+      options.shared.field.with_margin ? options.shared.field.margin_spacing : 0.0);
 }
 
 bool fits_view_scale(const BaselineOptions& options) {
   Options shared = options.shared;
   option_table::choose_by_contrast(shared);
-  return *shared.fit_view_scale;
+  return *shared.fit.fit_view_scale;
 }
 
 // Estimates the memory: the volumes and detectors of the method, and a pair of slabs and its rays
@@ -104,15 +106,15 @@ output::VoxelSource voxels_of(const VoxelVolume& densities) {
 
 nlohmann::json options_json(const BaselineOptions& options) {
   const Options& shared = options.shared;
-  const nlohmann::json all = option_table::to_json(options.files, shared);
+  const nlohmann::json all = option_table::to_json({options.files, shared});
   return {{"input", all["input"]},
           {"ctf_correction", base::name_of(options.ctf_correction)},
           {"specimen", all["specimen"]},
-          {"with_margin", shared.with_margin},
-          {"margin_spacing", shared.margin_spacing},
+          {"with_margin", shared.field.with_margin},
+          {"margin_spacing", shared.field.margin_spacing},
           {"fit_view_scale", fits_view_scale(options)},
-          {"hold_out", shared.hold_out},
-          {"tune", shared.tune},
+          {"hold_out", shared.fit.hold_out},
+          {"tune", shared.fit.tune},
           {"method", json_of(options.method)}};
 }
 
@@ -164,11 +166,11 @@ AfterIteration report_to(const base::ProgressSink& progress, const MethodFacts& 
 
 void write_volume(const Solution& solution, const measurement::Measurement& series,
                   const BaselineOptions& options, const std::filesystem::path& path) {
-  output::ModelInfo info = output::model_info(series, options.shared.contrast);
+  output::ModelInfo info = output::model_info(series, options.shared.views.contrast);
   info.options_json = options_json(options).dump();
   write_voxels(voxels_of(solution.densities), output::region_box(info, 1.0), info,
-               fmt::format("baseline {}", facts_of(options.method).name),
-               output::volume_options(options.shared), path);
+               fmt::format("baseline {}", facts_of(options.method).name), options.shared.volume,
+               path);
 }
 
 void write_results(const Solution& solution, const measurement::Measurement& series,
@@ -177,7 +179,7 @@ void write_results(const Solution& solution, const measurement::Measurement& ser
   write_volume(solution, series, options, paths.volume);
   io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
                               {"options", options_json(options)},
-                              {"origins", option_table::to_json(options.origins)},
+                              {"origins", option_table::settings_json(options.shared.settings)},
                               {"metrics", metrics}});
 }
 
@@ -191,11 +193,10 @@ BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays,
 measurement::Measurement prepare(const tilt_series::TiltSeries& tilt_series,
                                  const BaselineOptions& options,
                                  const std::filesystem::path& scratch_dir) {
-  measurement::Measurement series =
-      prepare_measurement(tilt_series, output::specimen_options(options.shared), scratch_dir,
-                          measurement::view_transfers(
-                              options.files, options.shared,
-                              output::series_options(options.files, options.shared), tilt_series));
+  measurement::Measurement series = measurement::prepare_measurement(
+      tilt_series, options.shared.specimen, scratch_dir,
+      measurement::view_transfers(output::series_options(options.files, options.shared),
+                                  options.shared.specimen.hand, tilt_series));
   if (series.transfers.empty()) return series;
   const base::TraceSpan span("correct contrast transfer");
   measurement::correct_ctf(options.ctf_correction, series);
@@ -215,23 +216,24 @@ BaselinePaths baseline_paths(const std::filesystem::path& volume) {
 void check_options(const BaselineOptions& options) {
   constexpr const char* kAdvice = "give --overwrite to replace it, or another name with -o";
   base::require_no_faults(option_table::range_faults(options.shared));
-  const auto faults = measurement::faults_of_transfer(options.files, options.shared);
+  const auto faults = measurement::faults_of_transfer(options.files, options.shared.views);
   base::require_no_faults({faults.begin(), faults.end()});
-  io::require_volume_name(options.shared.output);
-  const BaselinePaths paths = baseline_paths(options.shared.output);
+  io::require_volume_name(options.shared.run.output);
+  const BaselinePaths paths = baseline_paths(options.shared.run.output);
   io::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
-                         options.shared.overwrite, kAdvice);
-  if (options.shared.zarr) output::check_zarr(paths.volume, options.shared.overwrite, kAdvice);
+                         options.shared.run.overwrite, kAdvice);
+  if (options.shared.volume.zarr)
+    output::check_zarr(paths.volume, options.shared.run.overwrite, kAdvice);
 }
 
 std::vector<io::OutputLock> claim_outputs(const BaselineOptions& options) {
-  const BaselinePaths paths = baseline_paths(options.shared.output);
+  const BaselinePaths paths = baseline_paths(options.shared.run.output);
   return io::claim_outputs({paths.volume, paths.json}, [&] { check_options(options); });
 }
 
 BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {
   const measurement::Measurement planned =
-      plan_measurement(series, output::specimen_options(options.shared));
+      measurement::plan_measurement(series, options.shared.specimen);
   if (planned.x_tilt_deg != 0.0) {
     throw Error(fmt::format(
         "the series has an x-axis tilt of {}°, which this baseline does not turn back: leave "
@@ -240,8 +242,8 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
   }
   // This and trial_views() throw if there are too few views.
   const std::vector<int> held_out =
-      measurement::held_out_views(planned.geometry.tilt_deg, options.shared.hold_out);
-  if (options.shared.tune) tune::trial_views(planned.geometry.tilt_deg, held_out);
+      measurement::held_out_views(planned.geometry.tilt_deg, options.shared.fit.hold_out);
+  if (options.shared.fit.tune) tune::trial_views(planned.geometry.tilt_deg, held_out);
   const projection::SampleGrid grid = grid_of(planned, options);
   BaselinePlan plan;
   plan.num_views = planned.geometry.num_views();
@@ -253,7 +255,7 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
   plan.num_parameters = size.num_parameters;
   plan.memory_bytes = estimate_memory(planned, grid, facts_of(options.method), size,
                                       series.stored_memory(distributed::Communicator::alone()),
-                                      decoding_memory(series, planned), options.shared.tune);
+                                      decoding_memory(series, planned), options.shared.fit.tune);
   const std::string advice = fmt::format(
       "use a larger --bin or --margin-spacing, a smaller --roi or --thickness, or fewer "
       "--threads{}",
@@ -266,15 +268,15 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
                              const BaselineOptions& requested, const BaselineProgress& progress) {
   base::log_info(base::describe_threads());
   BaselineOptions options = requested;
-  const BaselinePaths paths = baseline_paths(options.shared.output);
+  const BaselinePaths paths = baseline_paths(options.shared.run.output);
   const bool fit_view_scale = fits_view_scale(options);
   measurement::Measurement series =
       prepare(tilt_series, options, io::scratch_directory(paths.volume));
   keep_beads(series);  // as bright particles may be the specimen
   const std::vector<int> held_out =
-      measurement::held_out_views(series.geometry.tilt_deg, options.shared.hold_out);
+      measurement::held_out_views(series.geometry.tilt_deg, options.shared.fit.hold_out);
   nlohmann::json tuning = nullptr;
-  if (options.shared.tune) {
+  if (options.shared.fit.tune) {
     const Tuned tuned =
         tune(options.method, {series, grid_of(series, options), held_out, fit_view_scale},
              progress.tuning);

@@ -9,7 +9,6 @@
 #include "io/saving/output_lock.h"
 #include "measurement/prepare.h"
 #include "microscope/view_filter.h"
-#include "option_table/setting.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
 
@@ -25,8 +24,6 @@ struct BaselineOptions {
   Method method;
   /// Corrects the views before, if there is a contrast transfer.
   microscope::CtfCorrection ctf_correction = microscope::CtfCorrection::kFlip;
-  /// Settings that the files of a project made, for the metrics; they are among the options.
-  std::vector<option_table::Setting> origins = {};
 };
 
 /// The files of a run, named after its volume.

@@ -278,7 +278,7 @@ std::string as_text(const std::vector<std::int64_t>& numbers) {
 
 output::ModelInfo model_info(const measurement::Measurement& series,
                              const options::ReconstructOptions& options) {
-  output::ModelInfo info = output::model_info(series, options.input.contrast);
+  output::ModelInfo info = output::model_info(series, options.views.contrast);
   info.options_json = options::options_json(options).dump();
   return info;
 }
@@ -293,7 +293,7 @@ std::string fingerprint_of(const options::ReconstructOptions& options,
     json["field"].erase(of_results);
   json["fit"].erase("split_tilts");  // the views of a half tell it apart
   json["fit"]["denoise"] =
-      options::denoise_factor(options.resolved.denoise);  // "strong" and "2" are one
+      options::denoise_factor(options.fit.denoise);  // "strong" and "2" are one
   json["tilt_deg"] = series.geometry.tilt_deg;
   if (series.ray_geometry) json["alignment"] = alignment_json(*series.ray_geometry);
   json["bin_factor"] = series.bin_factor;

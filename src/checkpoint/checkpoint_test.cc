@@ -29,7 +29,7 @@ class Checkpoint : public ::testing::Test {
   std::unique_ptr<fit::Fit> stopped_fit(std::int64_t steps) const {
     return stopped_fit(steps, series_.field());
   }
-  std::unique_ptr<fit::Fit> stopped_fit(std::int64_t steps, const fit::FieldOptions& field) const {
+  std::unique_ptr<fit::Fit> stopped_fit(std::int64_t steps, const FieldOptions& field) const {
     auto fit = series_.make(field);
     fit->run([&](const fit::Fit& f) { return f.progress().step != steps; });
     EXPECT_EQ(fit->progress().step, steps);
@@ -206,7 +206,7 @@ TEST_F(Checkpoint, AFieldOfOtherLeavesIsRefused) {
     return message_of<Error>([&] { restore_fit(file_, kFingerprint, *restored); });
   };
   EXPECT_EQ(refusal(*stopped), "");
-  fit::FieldOptions large = series_.field(), rich = series_.field(), grid = series_.field();
+  FieldOptions large = series_.field(), rich = series_.field(), grid = series_.field();
   large.leaf_size = 32;
   rich.rank = 3;
   grid.kind = FieldKind::kGrid;

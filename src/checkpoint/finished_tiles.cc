@@ -29,7 +29,7 @@ compact::CompressionReport report_of(const nlohmann::json& tile) {
 void forget_old_tiles(const options::ReconstructOptions& options,
                       const distributed::Communicator& processes) {
   std::error_code ignored;
-  const std::filesystem::path& output = options.resolved.output;
+  const std::filesystem::path& output = options.run.output;
   if (!output.empty() && processes.is_root() && options.may_use_tiles())
     std::filesystem::remove(output::output_paths(output).tiles, ignored);
 }
@@ -39,8 +39,8 @@ FinishedTiles::FinishedTiles(const options::ReconstructOptions& options,
     : options_(options),
       series_(series),
       origin_(origin),
-      path_(output::output_paths(options.resolved.output).tiles) {
-  if (!writes_file() || !options.resolved.resume || !std::filesystem::exists(path_)) return;
+      path_(output::output_paths(options.run.output).tiles) {
+  if (!writes_file() || !options.run.resume || !std::filesystem::exists(path_)) return;
   read_checkpoint([&] { read(); });
   base::log_info(fmt::format("resuming {} after row {}", path_.string(), num_rows()));
 }
@@ -52,7 +52,7 @@ void FinishedTiles::read() {
   const auto text = [&](const char* name) { return as_text(state.integers[name]); };
   if (!model.coded || text("fingerprint") != origin_.fingerprint)
     throw Error(fmt::format("'{}' was made from another series or with other options", path));
-  if (text("budget") != options_.resolved.budget)
+  if (text("budget") != options_.field.budget)
     throw Error(fmt::format("'{}' was made with --budget {}: give the same", path, text("budget")));
   try {
     tiles_ = io::parse_json(text("tiles"));
@@ -83,7 +83,7 @@ void FinishedTiles::save() const {
   const output::TrainingState state{.floats = {},
                                     .doubles = {},
                                     .integers = {{"fingerprint", as_numbers(origin_.fingerprint)},
-                                                 {"budget", as_numbers(options_.resolved.budget)},
+                                                 {"budget", as_numbers(options_.field.budget)},
                                                  {"tile_rows", {origin_.tile_rows.value_or(0)}},
                                                  {"tiles", as_numbers(tiles_.dump())}}};
   output::save_coded(path_, *coded_, model_info(series_, options_), &state);

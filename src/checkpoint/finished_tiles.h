@@ -52,7 +52,7 @@ class FinishedTiles {
   double mean_of(const char* key) const;
 
  private:
-  bool writes_file() const { return !options_.resolved.output.empty(); }
+  bool writes_file() const { return !options_.run.output.empty(); }
   void read();
 
   const options::ReconstructOptions& options_;

@@ -35,7 +35,7 @@ void print_log(base::LogLevel level, std::string_view message) {
 }
 
 void add_commands(CLI::App& program, const distributed::Communicator& processes,
-                  const std::vector<option_table::Setting>& origins) {
+                  const std::vector<Setting>& origins) {
   add_reconstruct_command(program, processes, origins);
   add_align_command(program, origins);
   add_baseline_command(program, origins);
@@ -145,8 +145,7 @@ void print_answer(const CLI::App& program, const CLI::ParseError& request) {
 // Parses the command line and runs the command. `origins` gets the settings that a project makes.
 // Returns the exit status, or throws.
 int run_command(CLI::App& program, std::vector<std::string> arguments,
-                const distributed::Communicator& processes,
-                std::vector<option_table::Setting>& origins) {
+                const distributed::Communicator& processes, std::vector<Setting>& origins) {
   if (arguments.empty()) {
     print_text(program.help());
     return report_output(/*is_result=*/true);
@@ -203,7 +202,7 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
   add_version_flag(program);
   program.formatter(std::make_shared<HelpFormatter>());
   program.require_subcommand(1);
-  std::vector<option_table::Setting> origins;
+  std::vector<Setting> origins;
   add_commands(program, processes, origins);
   try {
     return run_command(program, {argv + 1, argv + argc}, processes, origins);

@@ -39,7 +39,7 @@ const char* suffix_of(Purpose purpose) {
 // Returns the 1-based sections that are left out: the user's, and every second one of the rest.
 std::string excluded(Purpose purpose, const CompareOptions& options,
                      const tilt_series::TiltSeries& series) {
-  std::string sections = options.series.exclude;
+  std::string sections = options.series.views.exclude;
   if (purpose != Purpose::kOddViews && purpose != Purpose::kEvenViews) return sections;
   const std::size_t first = purpose == Purpose::kOddViews ? 1 : 0;
   for (std::size_t v = first; v < series.views().size(); v += 2)

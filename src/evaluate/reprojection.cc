@@ -163,7 +163,7 @@ measurement::ViewErrors reprojection_errors(const base::Volume& volume, const Vo
 VolumeScore score_volume(const VolumeScoreOptions& options) {
   const base::Volume volume = evaluate::read_volume(options.volume);
   const tilt_series::TiltSeries series(options.input);
-  measurement::SpecimenOptions specimen = options.specimen;
+  SpecimenOptions specimen = options.specimen;
   specimen.thickness = static_cast<double>(volume.shape.nz) * series.bin_factor();
   check_volume(volume, measurement::plan_measurement(series, specimen), options.volume);
   measurement::Measurement prepared =
@@ -174,7 +174,7 @@ VolumeScore score_volume(const VolumeScoreOptions& options) {
   VolumeScore score;
   score.unit = prepared.unit;
   score.errors = evaluate::reprojection_errors(
-      volume, {prepared.geometry, prepared.roi, !specimen.with_margin}, *prepared.rays,
+      volume, {prepared.geometry, prepared.roi, !options.with_margin}, *prepared.rays,
       scored_views(prepared.geometry, options.hold_out), noise_weight);
   for (const int view : score.errors.views)
     score.tilt_deg.push_back(prepared.geometry.tilt_deg[static_cast<std::size_t>(view)]);

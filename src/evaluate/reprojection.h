@@ -37,8 +37,9 @@ measurement::ViewErrors reprojection_errors(const base::Volume& volume, const Vo
 struct VolumeScoreOptions {
   std::filesystem::path volume;  ///< MRC, axes x, y, z, one voxel a binned pixel
   tilt_series::TiltSeriesOptions input;
-  measurement::SpecimenOptions specimen;  ///< `thickness` is the volume's own
-  int hold_out = 0;  ///< score every Nth view, as reconstruct holds them out; 0: all
+  SpecimenOptions specimen;  ///< `thickness` is the volume's own
+  bool with_margin = true;   ///< false: the specimen ends inside the region of interest
+  int hold_out = 0;          ///< score every Nth view, as reconstruct holds them out; 0: all
 };
 
 /// The reprojection error of a volume.

@@ -12,8 +12,8 @@ namespace tomofield::exchange {
 std::vector<std::filesystem::path> volume_descriptions(const options::ReconstructOptions& options) {
   std::vector<std::filesystem::path> files;
   if (const auto star = relion_output(options)) files.push_back(*star);
-  if (options.resolved.alignment_json)
-    files.push_back(output::output_paths(options.resolved.output).portal_alignment);
+  if (options.run.alignment_json)
+    files.push_back(output::output_paths(options.run.output).portal_alignment);
   return files;
 }
 
@@ -29,8 +29,8 @@ void write_exchange_files(const tilt_series::TiltSeries& series,
   const base::TraceSpan span("write files for other programs");
   write_relion_output(options, volume);
   write_alignment_results(series, options);
-  if (options.resolved.alignment_json) {
-    io::write_json(output::output_paths(options.resolved.output).portal_alignment,
+  if (options.run.alignment_json) {
+    io::write_json(output::output_paths(options.run.output).portal_alignment,
                    portal_alignment(series, options, volume));
   }
 }

@@ -51,13 +51,13 @@ json section_json(const tilt_series::TiltSeries& series, std::size_t index, int 
 
 json portal_alignment(const tilt_series::TiltSeries& series,
                       const options::ReconstructOptions& options, const fs::path& volume) {
-  const Options& resolved = options.resolved;
+  const SpecimenOptions& specimen = options.specimen;
   const double pixel_A = series.pixel_size_A() / series.bin_factor();
   const Place place =
-      place_of(io::MrcReader(volume).header(), resolved.axes, resolved.thickness * pixel_A);
-  const double axis_z_px = resolved.axis_z.value_or(resolved.thickness / 2) + resolved.shift_z;
+      place_of(io::MrcReader(volume).header(), options.volume.axes, specimen.thickness * pixel_A);
+  const double axis_z_px = specimen.axis_z.value_or(specimen.thickness / 2) + specimen.shift_z;
   const std::array<double, 3> middle_of_series_A{
-      resolved.axis_x ? *resolved.axis_x * pixel_A
+      specimen.axis_x ? *specimen.axis_x * pixel_A
                       : static_cast<double>(series.aligned_width()) / 2 * series.pixel_size_A(),
       static_cast<double>(series.aligned_height()) / 2 * series.pixel_size_A(),
       axis_z_px * pixel_A};
@@ -65,7 +65,7 @@ json portal_alignment(const tilt_series::TiltSeries& series,
   for (std::size_t a = 0; a < 3; ++a) offset_A[a] = place.middle_A[a] - middle_of_series_A[a];
   json sections = json::array();
   for (std::size_t i = 0; i < series.views().size(); ++i)
-    sections.push_back(section_json(series, i, resolved.hand));
+    sections.push_back(section_json(series, i, specimen.hand));
   return {
       {"alignment_type", "GLOBAL"},
       {"format", "TOMOFIELD"},

@@ -29,23 +29,23 @@ tilt_series::AlignedSection aligned_section(const tilt_series::TiltSeries& serie
 }  // namespace
 
 std::optional<fs::path> relion_alignment(const options::ReconstructOptions& options) {
-  if (options.resolved.align == Alignment::kOff || options.input.images ||
-      options.input.stack.extension() != ".star")
+  if (options.run.align == Alignment::kOff || options.images ||
+      options.files.stack.extension() != ".star")
     return std::nullopt;
-  return output::output_paths(options.resolved.output).alignment_star;
+  return output::output_paths(options.run.output).alignment_star;
 }
 
 void write_relion_alignment(const tilt_series::TiltSeries& series,
                             const options::ReconstructOptions& options) {
   const std::optional<fs::path> path = relion_alignment(options);
   if (!path) return;
-  const io::ViewTable listed = io::read_relion_views(options.input.stack);
-  const auto stack = tilt_series::open_views(options.input);
+  const io::ViewTable listed = io::read_relion_views(options.files.stack);
+  const auto stack = tilt_series::open_views(options.input());
   const double pixel_size_A = series.pixel_size_A() / series.bin_factor();
   std::vector<std::size_t> sections;
   for (const tilt_series::View& view : series.views())
     sections.push_back(static_cast<std::size_t>(view.section));
-  io::StarTable table = io::read_relion_rows(options.input.stack).only(sections);
+  io::StarTable table = io::read_relion_rows(options.files.stack).only(sections);
   for (std::size_t view = 0; view < sections.size(); ++view) {
     io::ListedView aligned = listed.views.at(sections[view]);
     tilt_series::set_alignment(aligned_section(series, view), listed.centre, stack->header(),

@@ -26,13 +26,13 @@ namespace {
 constexpr const char* kEntry = "rlnTomoTiltSeriesStarFile";
 constexpr const char* kTomogram = "rlnTomoReconstructedTomogram";
 
-const option_table::Setting* find_origin(const options::ReconstructOptions& options) {
-  const auto found = std::ranges::find(options.origins, kEntry, &option_table::Setting::entry);
-  return found == options.origins.end() ? nullptr : &*found;
+const Setting* find_origin(const options::ReconstructOptions& options) {
+  const auto found = std::ranges::find(options.settings, kEntry, &Setting::entry);
+  return found == options.settings.end() ? nullptr : &*found;
 }
 
 // Returns the row of the tilt series that was reconstructed. Several rows may name the same file.
-std::size_t find_row(const io::RelionTomograms& all, const option_table::Setting& origin) {
+std::size_t find_row(const io::RelionTomograms& all, const Setting& origin) {
   for (std::size_t row = 0; row < all.tomograms.size(); ++row) {
     const io::RelionTomogram& tomogram = all.tomograms[row];
     if (tomogram.name == origin.row &&
@@ -46,11 +46,11 @@ std::size_t find_row(const io::RelionTomograms& all, const option_table::Setting
 
 // Says why RELION could not use the volume, or nothing if it can.
 const char* obstacle(const Options& options) {
-  if (options.axes != VolumeAxes::kXyz) return "its axes are not in the order xyz";
-  if (options.roi) return "it is a part of the specimen (--roi)";
-  if (options.axis_x || options.axis_z || options.shift_z != 0)
+  if (options.volume.axes != VolumeAxes::kXyz) return "its axes are not in the order xyz";
+  if (options.specimen.roi) return "it is a part of the specimen (--roi)";
+  if (options.specimen.axis_x || options.specimen.axis_z || options.specimen.shift_z != 0)
     return "its middle is not the point about which the series is aligned";
-  if (options.hand != 1) return "it is mirrored in Z (--hand -1)";
+  if (options.specimen.hand != 1) return "it is mirrored in Z (--hand -1)";
   return nullptr;
 }
 
@@ -78,8 +78,8 @@ void set_halves(const fs::path& volume, io::StarTable& table) {
 }  // namespace
 
 std::optional<fs::path> relion_output(const options::ReconstructOptions& options) {
-  if (find_origin(options) == nullptr || obstacle(options.resolved) != nullptr) return std::nullopt;
-  return output::output_paths(options.resolved.output).tomogram_star;
+  if (find_origin(options) == nullptr || obstacle(options) != nullptr) return std::nullopt;
+  return output::output_paths(options.run.output).tomogram_star;
 }
 
 std::optional<io::StarTable> read_relion_output(const fs::path& volume) {
@@ -97,12 +97,12 @@ std::optional<io::StarTable> read_relion_output(const fs::path& volume) {
 }
 
 void write_relion_output(const options::ReconstructOptions& options, const fs::path& volume) {
-  const option_table::Setting* const origin = find_origin(options);
-  const fs::path path = options.resolved.output;
+  const Setting* const origin = find_origin(options);
+  const fs::path path = options.run.output;
   if (!relion_output(options) && read_relion_output(path))
     remove_with_commit(output::output_paths(path).tomogram_star);
   if (origin == nullptr) return;
-  if (const char* const why = obstacle(options.resolved)) {
+  if (const char* const why = obstacle(options)) {
     base::log_warning(
         fmt::format("no STAR file is written for RELION beside '{}': {}", path.string(), why));
     return;

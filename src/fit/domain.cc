@@ -65,7 +65,7 @@ std::vector<field::LeafShape> leaf_shapes(const field::Quadtree& tree, double th
     shapes.push_back(leaf_shape(static_cast<double>(tree.leaf(leaf).square.size), thickness,
                                 inside ? options.vertex_spacing : options.margin_spacing,
                                 inside ? options.finest_spacing() : options.margin_spacing,
-                                inside ? options.rank : options.margin_rank));
+                                inside ? *options.rank : kMarginRank));
   }
   return shapes;
 }
@@ -89,7 +89,7 @@ Domain cover(double thickness, const Rectangle& roi, geometry::Extent2 reach,
   const auto end_row = static_cast<std::int64_t>(std::ceil(reach.y1));
   reach.y0 = static_cast<double>(roots.y0);
   reach.y1 = static_cast<double>(end_row);
-  field::Quadtree tree = make_tree(roots, roi, options.depth);
+  field::Quadtree tree = make_tree(roots, roi, depth_of(options));
   std::vector<field::LeafShape> shapes = leaf_shapes(tree, thickness, options);
   return {.roi = roi,
           .support = reach,
@@ -105,7 +105,7 @@ Domain cover(double thickness, const Rectangle& roi, geometry::Extent2 reach,
 }  // namespace
 
 std::int64_t band_rows(const FieldOptions& options) {
-  return static_cast<std::int64_t>(options.leaf_size) << options.depth;
+  return static_cast<std::int64_t>(*options.leaf_size) << depth_of(options);
 }
 
 Domain make_domain(const geometry::TiltGeometry& geometry, const Rectangle& roi,
@@ -170,13 +170,14 @@ double bias_of_density(double density, double beta) {
 
 std::unique_ptr<field::Field> make_initial_field(const Domain& domain, double thickness,
                                                  double mean_density, const FieldOptions& options,
-                                                 std::uint64_t seed, const std::vector<int>& kept) {
+                                                 std::uint64_t seed, const std::vector<int>& kept,
+                                                 const FieldStart& start) {
   auto field = field::make_field(options.kind, domain.tree, thickness, domain.shapes);
-  const double beta = options.activation == Activation::kSoftplus ? options.sharpness : 0.0;
+  const double beta = options.activation == Activation::kSoftplus ? start.sharpness : 0.0;
   field->activation.beta = static_cast<float>(beta);
   field->bias = static_cast<float>(bias_of_density(mean_density, beta));
   field->keep_only(kept);
-  field->initialise(base::Random(seed), options.initial_scale);
+  field->initialise(base::Random(seed), start.initial_scale);
   return field;
 }
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "field/field.h"
-#include "fit/options.h"
+#include "fit/constants.h"
 #include "geometry/ray_geometry.h"
 #include "geometry/tilt_geometry.h"
 #include "projection/sample_grid.h"
@@ -73,6 +73,7 @@ double bias_of_density(double density, double beta);
 std::unique_ptr<field::Field> make_initial_field(const Domain& domain, double thickness,
                                                  double mean_density, const FieldOptions& options,
                                                  std::uint64_t seed,
-                                                 const std::vector<int>& kept = {});
+                                                 const std::vector<int>& kept = {},
+                                                 const FieldStart& start = {});
 
 }  // namespace tomofield::fit

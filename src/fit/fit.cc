@@ -61,9 +61,15 @@ Domain domain_of(const measurement::Measurement& measurement, const FieldOptions
 
 // Returns the domain with the vertices that the first field is made with: those of full resolution,
 // or those of the first stage if the fit never comes to full resolution.
-Domain with_shapes_for(const FitOptions& options, const Stage& first, Domain domain) {
-  if (options.num_stages > 0) domain.shapes = domain.shapes_in(domain.tree, first.bin);
+Domain with_shapes_for(const FitPart& part, const Stage& first, Domain domain) {
+  if (part.num_stages > 0) domain.shapes = domain.shapes_in(domain.tree, first.bin);
   return domain;
+}
+
+// Returns the first `num_stages` stages; 0: all.
+std::vector<Stage> first_stages(std::vector<Stage> stages, int num_stages) {
+  if (num_stages > 0) stages.resize(std::min(stages.size(), static_cast<std::size_t>(num_stages)));
+  return stages;
 }
 
 int steps_per_epoch_of(const measurement::Measurement& measurement, const FitOptions& options) {
@@ -109,14 +115,15 @@ TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
 }  // namespace
 
 Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_options,
-         const FitOptions& options, const distributed::Communicator& processes)
+         const FitOptions& options, const distributed::Communicator& processes, FitPart part)
     : measurement_(measurement),
       processes_(processes),
       options_(with_at_most_one_subset_a_view(options, measurement.num_fitted_views())),
-      stages_(make_stages(field_options, options_)),
+      part_(part),
+      stages_(first_stages(make_stages(field_options, options_), part.num_stages)),
       domain_(domain_of(measurement, field_options)),
       share_(measurement::row_share(domain_.num_rows, domain_.tree.roots().cell_size, processes)),
-      field_(make_initial_field(with_shapes_for(options, stages_.front(), domain_),
+      field_(make_initial_field(with_shapes_for(part, stages_.front(), domain_),
                                 measurement.geometry.thickness, measurement.mean_density,
                                 of_kind(field_options, stages_.front().field_kind), options.seed,
                                 leaves_to_keep(processes, domain_.tree, share_, options_))),
@@ -462,7 +469,7 @@ void Fit::end_epoch() {
   fit_views(noise_weights);
   progress_.epoch_sums.assign(progress_.views.size(), {});
   limit_spikes();
-  if (options_.scores_epochs && !measurement_.held_out.empty()) score_held_out();
+  if (part_.scores_epochs && !measurement_.held_out.empty()) score_held_out();
   const std::int64_t epochs_done = progress_.step / steps_per_epoch();
   if (tree_updates_.update(epochs_done, *field_, optimizer_.state(), progress_.tree)) follow_tree();
   if (epochs_done > 0 && epochs_done == stage().first_epoch) refine();

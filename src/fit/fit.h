@@ -14,7 +14,6 @@
 #include "fit/adam.h"
 #include "fit/domain.h"
 #include "fit/halo.h"
-#include "fit/options.h"
 #include "fit/stages.h"
 #include "fit/tree_updates.h"
 #include "measurement/held_out.h"
@@ -23,6 +22,7 @@
 #include "measurement/surrogate_views.h"
 #include "objective/objective.h"
 #include "projection/slab_projector.h"
+#include "tomofield/options.h"
 
 namespace tomofield::fit {
 
@@ -38,6 +38,12 @@ struct Progress {
   std::vector<double> view_residual;
   TreeProgress tree;
   std::vector<double> held_out_error;  ///< of each epoch: the same of the held-out views, if any
+};
+
+/// The part of a fit that is made.
+struct FitPart {
+  int num_stages = 0;         ///< of make_stages(), from the first one on; 0: all
+  bool scores_epochs = true;  ///< score the held-out views after each epoch
 };
 
 /// Fits a field to the measured views: it minimises an objective (eq. 9) with Adam.
@@ -58,7 +64,8 @@ class Fit {
   /// Makes the initial field. `measurement` and `processes` must outlive the fit.
   Fit(const measurement::Measurement& measurement, const FieldOptions& field_options,
       const FitOptions& options,
-      const distributed::Communicator& processes = distributed::Communicator::alone());
+      const distributed::Communicator& processes = distributed::Communicator::alone(),
+      FitPart part = {});
 
   /// Keeps the views at these models, which another fit found in pixels of full resolution, instead
   /// of fitting any. Scales and offsets hold from now on. Weights and largest residuals hold from
@@ -82,7 +89,7 @@ class Fit {
   void go_on_from(Progress progress, std::unique_ptr<field::Field> field);
 
   /// Goes on where another fit has ended, which has the first stages of this one
-  /// (FitOptions::num_stages) and its rows among others: takes over its models of the views, and
+  /// (FitPart::num_stages) and its rows among others: takes over its models of the views, and
   /// the vertices of those of its leaves that this fit has as well. Call it before the first step.
   void go_on_from_stages(const Progress& progress, const field::Field& field);
 
@@ -189,6 +196,7 @@ class Fit {
   const measurement::Measurement& measurement_;
   const distributed::Communicator& processes_;
   FitOptions options_;
+  FitPart part_;
   std::vector<Stage> stages_;
   base::AlignedBuffer<float> prior_state_;  // prior_state()
   Domain domain_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fit/constants.h"
 #include "kernels/lanes.h"
 
 namespace tomofield::fit {
@@ -31,7 +32,7 @@ std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
   if (fit.engine != Engine::kSlab) return bins;
   const bool is_adaptive = field.tree == TreeKind::kAdaptive;
   const bool may_halve = is_adaptive && field.leaf_size % (2 * kernels::kLanes) == 0;
-  const int smallest_leaf = may_halve ? field.leaf_size / 2 : field.leaf_size;
+  const int smallest_leaf = may_halve ? field.leaf_size / 2 : *field.leaf_size;
   const int max_bin = is_adaptive ? std::min(fit.coarse_bin, 2) : fit.coarse_bin;
   for (int bin = 2; bin <= max_bin && smallest_leaf % (bin * kernels::kLanes) == 0; bin *= 2) {
     if (std::ssize(bins) < fit.coarse_epochs) bins.push_back(bin);
@@ -75,9 +76,9 @@ bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit) {
     return false;
   const double side = field.leaf_size / field.vertex_spacing;
   const double left = side + 1 - field.rank;  // vertices along x and along y beyond the rank
-  const double margin_side = (field.leaf_size << field.depth) / field.margin_spacing;
+  const double margin_side = (field.leaf_size << depth_of(field)) / field.margin_spacing;
   return side <= 2 * field.rank && left > 0 && left * left >= field.rank &&
-         (!field.with_margin || margin_side <= 4 * field.margin_rank);
+         (!field.with_margin || margin_side <= 4 * kMarginRank);
 }
 
 bool can_have_learned_prior(const FieldOptions& field, const FitOptions& fit) {
@@ -97,18 +98,17 @@ Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit, bool i
 std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit) {
   const std::vector<int> bins = coarse_bins(field, fit);
   const bool has_vertices = fit.vertex_epochs > 0;
-  const FieldKind first_kind = has_vertices ? FieldKind::kGrid : field.kind;
-  const double rate = fit.learning_rate * (has_vertices ? fit.vertex_rate : 1.0);
+  const FieldKind first_kind = has_vertices ? FieldKind::kGrid : *field.kind;
+  const double rate = fit.learning_rate * (has_vertices ? kVertexRate : 1.0);
   const double cost = has_vertices ? kVertexCost : 1.0;
   std::vector<Stage> stages;
   std::int64_t first_epoch = 0;
   double first_rate = rate;
   const auto add_before_last = [&](int bin, int epochs) {
-    stages.push_back({first_kind, bin, first_epoch, epochs, first_rate,
-                      rate * fit.coarse_final_rate,
+    stages.push_back({first_kind, bin, first_epoch, epochs, first_rate, rate * kCoarseFinalRate,
                       cost * cost_of_bin(bin, field.finest_spacing())});
     first_epoch += epochs;
-    first_rate = rate * fit.refined_rate;
+    first_rate = rate * kRefinedRate;
   };
   for (std::size_t left = bins.size(); left > 0; --left) {
     add_before_last(bins[left - 1],
@@ -116,13 +116,11 @@ std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit)
   }
   if (has_vertices) {
     add_before_last(1, fit.vertex_epochs);
-    first_rate = fit.learning_rate * fit.factorised_rate;
+    first_rate = fit.learning_rate * kFactorisedRate;
   }
   stages.push_back(
-      {field.kind, 1, first_epoch, fit.epochs, first_rate, fit.learning_rate * fit.final_rate});
+      {field.kind, 1, first_epoch, fit.epochs, first_rate, fit.learning_rate * kFinalRate});
   if (fit.prior != Prior::kTv) add_learned_prior(fit, stages);
-  if (fit.num_stages > 0)
-    stages.resize(std::min(stages.size(), static_cast<std::size_t>(fit.num_stages)));
   return stages;
 }
 

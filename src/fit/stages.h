@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/options.h"
+#include "tomofield/options.h"
 
 namespace tomofield::fit {
 
@@ -66,8 +66,7 @@ Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit, bool i
 ///   4. With the learned prior (FitOptions::prior), a light stage follows. The prior answers to its
 ///      start and its end. The last stage begins with the answer.
 ///
-/// The ray engine has the last stage alone. With FitOptions::num_stages the later ones are left
-/// out.
+/// The ray engine has the last stage alone.
 std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit);
 
 }  // namespace tomofield::fit

@@ -1,10 +1,12 @@
 #include "fit/stages.h"
-#include "base/enum_names.h"
 
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
+
+#include "base/enum_names.h"
+#include "fit/constants.h"
 
 namespace tomofield::fit {
 namespace {
@@ -44,7 +46,7 @@ TEST(Stages, FollowOneAnother) {
   EXPECT_EQ(stages[1].first_epoch, 3);
   EXPECT_EQ(stages[1].epochs, 7);
   EXPECT_EQ(stages[0].first_rate, fit.learning_rate);
-  EXPECT_DOUBLE_EQ(stages[1].last_rate, fit.learning_rate * fit.final_rate);
+  EXPECT_DOUBLE_EQ(stages[1].last_rate, fit.learning_rate * kFinalRate);
   fit.coarse_epochs = 0;
   EXPECT_EQ(make_stages({}, fit).size(), 1u);
   EXPECT_EQ(make_stages({}, fit)[0].first_rate, fit.learning_rate);
@@ -154,7 +156,6 @@ TEST(Stages, FactorsBeginAsVerticesWhereTheseAreNoMore) {
   EXPECT_TRUE(begins_with_vertices(factors(32, 24), slabs));
   EXPECT_TRUE(begins_with_vertices(factors(32, 16), slabs));
   FieldOptions wide = factors(64, 16, 2);
-  wide.depth = 0;
   EXPECT_TRUE(begins_with_vertices(wide, slabs));
   EXPECT_FALSE(begins_with_vertices(factors(32, 15), slabs));
   EXPECT_FALSE(begins_with_vertices(factors(256, 16, 2.5), slabs));

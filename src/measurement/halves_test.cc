@@ -40,9 +40,8 @@ class FrameHalves {
     const auto write = [&](const char* name, const testing::PixelFunction& value) {
       return write_stack(scratch_ / name, 40, 36, kNumViews, value);
     };
-    options_.halves = {
-        {write("even.mrc", [](auto x, auto y, auto v) { return of_half(x, y, v, 1); }),
-         write("odd.mrc", [](auto x, auto y, auto v) { return of_half(x, y, v, 2); })}};
+    options_.even = write("even.mrc", [](auto x, auto y, auto v) { return of_half(x, y, v, 1); });
+    options_.odd = write("odd.mrc", [](auto x, auto y, auto v) { return of_half(x, y, v, 2); });
     options_.stack = write("all.mrc", [](auto x, auto y, auto v) {
       return x == 12 && y == 13 && v == 4 ? 1e6f : of_half(x, y, v, 1) + of_half(x, y, v, 2);
     });

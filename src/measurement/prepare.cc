@@ -260,7 +260,9 @@ void log_masks(const Measurement& prepared) {
 
 }  // namespace
 
-std::vector<std::string> SpecimenOptions::faults() const {
+std::vector<std::string> faults_of(const SpecimenOptions& specimen) {
+  const double thickness = specimen.thickness;
+  const int hand = specimen.hand;
   std::vector<std::string> found;
   if (!(thickness >= 1 && thickness <= kMaxThickness)) {
     found.push_back(
@@ -281,7 +283,7 @@ std::size_t decoding_memory(const tilt_series::TiltSeries& series, const Measure
 
 Measurement plan_measurement(const tilt_series::TiltSeries& series,
                              const SpecimenOptions& specimen) {
-  base::require_no_faults(specimen.faults());
+  base::require_no_faults(faults_of(specimen));
   Measurement plan;
   plan.bin_factor = series.bin_factor();
   plan.pixel_size_A = series.pixel_size_A();

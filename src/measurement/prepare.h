@@ -18,19 +18,8 @@
 
 namespace tomofield::measurement {
 
-/// The specimen as the user describes it. Lengths and positions are pixels of the aligned view
-/// before binning.
-struct SpecimenOptions {
-  double thickness = 0;          ///< of the volume along Z
-  std::optional<Rectangle> roi;  ///< default: the whole field of view
-  int hand = 1;                  ///< 1 or −1 (TiltGeometry)
-  std::optional<double> axis_x;  ///< tilt axis on the view; default: its centre
-  std::optional<double> axis_z;  ///< and in the volume; default: its centre
-  double shift_z = 0;            ///< moves the specimen up in the volume
-  bool with_margin = true;       ///< false: the specimen ends inside the field of view
-  /// Returns every fault of these options, a sentence each.
-  std::vector<std::string> faults() const;
-};
+/// Returns every fault of what a user says of the specimen, a sentence each.
+std::vector<std::string> faults_of(const SpecimenOptions& specimen);
 
 /// Returns everything of the measurement that follows from the series' geometry; it has no rays.
 /// Throws Error for options that do not fit the series.

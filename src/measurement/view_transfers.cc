@@ -107,7 +107,7 @@ void match_sections(const Sections& sections, io::CtfTable& table) {
 }
 
 // Returns the contrast transfer of each section, or nothing without any.
-std::optional<io::CtfTable> find_ctf(const SeriesFiles& files, const Options& options,
+std::optional<io::CtfTable> find_ctf(const SeriesFiles& files, const ViewOptions& options,
                                      const Sections& sections) {
   if (const auto& um = options.defocus_um) {
     const double defocus_A = *um * kAngstroms_in_um;
@@ -144,7 +144,7 @@ void warn_of_voltages(double used_kV, const io::CtfTable& ctf) {
 
 // Returns the optics: those of the options, else those of the file, else the usual ones. The
 // voltage is also that of an .mdoc.
-microscope::Optics find_optics(const SeriesFiles& files, const Options& options,
+microscope::Optics find_optics(const SeriesFiles& files, const ViewOptions& options,
                                const std::optional<io::CtfTable>& ctf) {
   const io::StatedOptics stated = ctf ? ctf->optics : io::StatedOptics{};
   microscope::Optics optics;
@@ -227,7 +227,7 @@ std::optional<Recording> find_recording(const SeriesFiles& files, const Sections
 }
 
 // Returns the exposure of each section, or nothing if it is not known or not wanted.
-std::optional<Exposures> find_exposures(const SeriesFiles& files, const Options& options,
+std::optional<Exposures> find_exposures(const SeriesFiles& files, const ViewOptions& options,
                                         const Sections& sections) {
   const std::optional<double>& of_view = options.dose_per_tilt;
   if (options.is_dose_weighted) {
@@ -272,8 +272,8 @@ std::shared_ptr<const microscope::Detector> find_detector(const SeriesFiles& fil
 }
 
 // Sets the defocus of a view, turned to the aligned image, and its slope over that image.
-void set_defocus(const Options& options, const tilt_series::TiltSeries& series, std::size_t view,
-                 const io::CtfTable& ctf, microscope::ViewTransfer& transfer) {
+void set_defocus(const ViewOptions& options, int hand, const tilt_series::TiltSeries& series,
+                 std::size_t view, const io::CtfTable& ctf, microscope::ViewTransfer& transfer) {
   const tilt_series::View& of = series.views()[view];
   const std::optional<io::Defocus>& recorded = ctf.views[static_cast<std::size_t>(of.section)];
   if (!recorded)
@@ -281,16 +281,16 @@ void set_defocus(const Options& options, const tilt_series::TiltSeries& series, 
         fmt::format("'{}' has no defocus of section {}: add it, or leave the section out "
                     "with --exclude {}",
                     ctf.file.string(), of.section + 1, of.section + 1));
-  const bool is_right = options.defocus_hand.value_or(options.hand) > 0;
-  const auto hand = is_right ? microscope::DefocusHand::kRight : microscope::DefocusHand::kLeft;
+  const bool is_right = options.defocus_hand.value_or(hand) > 0;
+  const auto side = is_right ? microscope::DefocusHand::kRight : microscope::DefocusHand::kLeft;
   transfer.defocus = microscope::aligned_defocus(*recorded, series.raw_from_aligned(view));
-  transfer.slope = microscope::slope_of_tilt(of.tilt_deg, series.pixel_size_A(), hand);
+  transfer.slope = microscope::slope_of_tilt(of.tilt_deg, series.pixel_size_A(), side);
   transfer.is_flipped = options.is_phase_flipped;
 }
 
 }  // namespace
 
-std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const Options& options) {
+std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const ViewOptions& options) {
   std::vector<const char*> all;
   const auto refuse_if = [&](bool is_fault, const char* sentence) {
     if (is_fault) all.push_back(sentence);
@@ -309,10 +309,11 @@ std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const Opti
   return all;
 }
 
-std::vector<microscope::ViewTransfer> view_transfers(const SeriesFiles& files,
-                                                     const Options& options,
-                                                     const tilt_series::TiltSeriesOptions& input,
+std::vector<microscope::ViewTransfer> view_transfers(const tilt_series::TiltSeriesOptions& input,
+                                                     int hand,
                                                      const tilt_series::TiltSeries& series) {
+  const SeriesFiles& files = input;
+  const ViewOptions& options = input;
   if (!has_ctf(files, options) && !files.ctf && options.contrast == Contrast::kDark)
     base::log_info(
         "ctf: none is given (--ctf or --defocus), so the views count as plain projections: "
@@ -333,7 +334,7 @@ std::vector<microscope::ViewTransfer> view_transfers(const SeriesFiles& files,
     transfer.pixel_size_A = series.pixel_size_A();
     transfer.detector = detector;
     if (exposures) transfer.exposure = (*exposures)[section].at_middle();
-    if (ctf) set_defocus(options, series, view, *ctf, transfer);
+    if (ctf) set_defocus(options, hand, series, view, *ctf, transfer);
   }
   return transfers;
 }

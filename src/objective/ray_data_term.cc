@@ -27,8 +27,7 @@ double smallest_leaf(const field::Quadtree& tree) {
 }
 
 // Returns one sample a pixel along the diagonal of the smallest leaf, unless the options say more.
-int samples_per_diagonal(const ObjectiveOptions& options, const field::Quadtree& tree,
-                         double thickness) {
+int samples_per_diagonal(const FitOptions& options, const field::Quadtree& tree, double thickness) {
   if (options.ray_samples > 0) return options.ray_samples;
   const double size = smallest_leaf(tree);
   return static_cast<int>(std::ceil(std::hypot(size, size, thickness)));
@@ -40,8 +39,7 @@ std::uint32_t draw_of(std::uint64_t seed, std::uint64_t stream) {
 
 }  // namespace
 
-int ray_steps_per_epoch(const ObjectiveOptions& options,
-                        const measurement::SlabViews::Shape& shape) {
+int ray_steps_per_epoch(const FitOptions& options, const measurement::SlabViews::Shape& shape) {
   if (options.rays_per_step == 0) return options.subsets;
   const std::int64_t rays =
       static_cast<std::int64_t>(shape.num_views) * shape.width * shape.num_rows;
@@ -51,7 +49,7 @@ int ray_steps_per_epoch(const ObjectiveOptions& options,
 
 RayDataTerm::RayDataTerm(const geometry::RayGeometry& geometry,
                          const measurement::SlabViews& measured, const field::Field& field,
-                         const RayRegion& region, const ObjectiveOptions& options)
+                         const RayRegion& region, const FitOptions& options)
     : measured_(measured),
       roi_{static_cast<double>(region.roi.x0), static_cast<double>(region.roi.y0),
            static_cast<double>(region.roi.x1), static_cast<double>(region.roi.y1)},
@@ -65,8 +63,7 @@ RayDataTerm::RayDataTerm(const geometry::RayGeometry& geometry,
 }
 
 std::size_t RayDataTerm::working_memory(const geometry::RayGeometry& geometry,
-                                        const field::Quadtree& tree,
-                                        const ObjectiveOptions& options,
+                                        const field::Quadtree& tree, const FitOptions& options,
                                         const measurement::SlabViews::Shape& shape) {
   constexpr double kBytesPerPiece = 128, kBytesPerSample = 4, kPadding = 16, kBytesPerRay = 40;
   const double thickness = geometry.aligned.thickness, size = smallest_leaf(tree);

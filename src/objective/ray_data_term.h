@@ -22,8 +22,7 @@ struct RayRegion {
 };
 
 /// Returns the number of steps in which the ray engine sees every ray of a series once.
-int ray_steps_per_epoch(const ObjectiveOptions& options,
-                        const measurement::SlabViews::Shape& shape);
+int ray_steps_per_epoch(const FitOptions& options, const measurement::SlabViews::Shape& shape);
 
 /// Computes the data term of eq. 9 on random batches of rays. Let an epoch have n steps. Each view
 /// is divided into runs of n pixels, and every step takes another random pixel of each run. So an
@@ -33,7 +32,7 @@ class RayDataTerm : public Term {
  public:
   /// `measured` and `field` must outlive the term.
   RayDataTerm(const geometry::RayGeometry& geometry, const measurement::SlabViews& measured,
-              const field::Field& field, const RayRegion& region, const ObjectiveOptions& options);
+              const field::Field& field, const RayRegion& region, const FitOptions& options);
 
   int steps_per_epoch() const { return steps_per_epoch_; }
 
@@ -42,7 +41,7 @@ class RayDataTerm : public Term {
 
   /// Estimates the bytes that a step needs in addition to the parameters.
   static std::size_t working_memory(const geometry::RayGeometry& geometry,
-                                    const field::Quadtree& tree, const ObjectiveOptions& options,
+                                    const field::Quadtree& tree, const FitOptions& options,
                                     const measurement::SlabViews::Shape& shape);
 
   /// Returns the rays of a step, sorted by the row of root cells that they cross.

@@ -26,7 +26,7 @@ struct SlabObjectiveContext {
   bool has_factors = true;                     ///< the field has the factors that were asked for
   measurement::RowShare share;                 ///< rows of this process, in pixels of `full`
   base::Range own_leaves;                      ///< leaves of its bands
-  const ObjectiveOptions& options;
+  const FitOptions& options;
   const distributed::Communicator& processes = distributed::Communicator::alone();
   bool is_light = false;               ///< the stage has little total variation (Stage::is_light)
   std::span<const float> answer = {};  ///< of the learned prior, if the stage is pulled towards one

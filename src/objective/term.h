@@ -13,9 +13,9 @@
 #include "measurement/measurement.h"
 #include "measurement/surrogate_views.h"
 #include "measurement/view_residuals.h"
-#include "objective/options.h"
 #include "projection/slab_projector.h"
 #include "projection/slab_sampler.h"
+#include "tomofield/options.h"
 
 namespace tomofield::objective {
 
@@ -129,7 +129,7 @@ struct TermContext {
   geometry::Extent2 support;                 ///< where densities count
   bool has_factors = true;                   ///< the field has the factors that were asked for
   base::Range own_leaves;                    ///< leaves of this process
-  const ObjectiveOptions& options;
+  const FitOptions& options;
   const distributed::Communicator& processes = distributed::Communicator::alone();
   bool is_light = false;               ///< the stage has little total variation (Stage::is_light)
   std::span<const float> answer = {};  ///< of the learned prior, if the stage is pulled towards one

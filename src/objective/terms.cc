@@ -4,6 +4,7 @@
 
 #include "objective/answer_pull.h"
 #include "objective/boundary_consistency.h"
+#include "objective/constants.h"
 #include "objective/fourier_prior.h"
 #include "objective/noise_scale.h"
 #include "objective/ray_data_term.h"
@@ -17,10 +18,10 @@ namespace {
 // bin² pixels on a path bin times as long, so a voxel of it has a noise smaller by bin².
 kernels::VariationPenalty variation_penalty(const TermContext& c) {
   kernels::VariationPenalty penalty;
-  penalty.epsilon = static_cast<float>(c.options.gradient_floor);
+  penalty.epsilon = static_cast<float>(kGradientFloor);
   if (c.options.penalty == Penalty::kConcave && !c.is_light)
     penalty.concavity =
-        static_cast<float>(concavity(c.options.concavity, c.full.noise_sigma) / (c.bin * c.bin));
+        static_cast<float>(concavity(kConcavity, c.full.noise_sigma) / (c.bin * c.bin));
   return penalty;
 }
 
@@ -72,7 +73,7 @@ FourierPriorOptions fourier_options(const TermContext& c, double noise) {
 
 }  // namespace
 
-double variation_gain(const ObjectiveOptions& options, const measurement::Measurement& full) {
+double variation_gain(const FitOptions& options, const measurement::Measurement& full) {
   if (options.penalty != Penalty::kConcave) return 1.0;
   return gain_of_little_noise(typical_noise(full.noise_sigma), full.contrast());
 }

@@ -13,6 +13,6 @@ std::vector<std::unique_ptr<Term>> make_terms(const TermContext& context);
 
 /// Returns the factor on the weight of the density's variation: more than 1 if the penalty is
 /// concave and there is little noise (noise_scale.h).
-double variation_gain(const ObjectiveOptions& options, const measurement::Measurement& full);
+double variation_gain(const FitOptions& options, const measurement::Measurement& full);
 
 }  // namespace tomofield::objective

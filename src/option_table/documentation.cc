@@ -1,8 +1,12 @@
 #include "option_table/documentation.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <filesystem>
+#include <optional>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "option_table/rows.h"
@@ -23,8 +27,8 @@ options that people use, `--help-all` shows all of them. The other commands (`ba
 - The command line takes a value after a space or an equals sign: `--rank 16`, `--center=-3,20`.
 - `--config FILE.toml` reads options from a file: `rank = 16`, `tune = true`, `roi = [0, 0, 512, 512]`.
   Options on the command line win.
-- The name is that of the member of `tomofield::Options` (of `tomofield::SeriesFiles` for files) in
-  C++, and of the argument in Python.
+- The name is that of the argument in Python, and of the member in C++: of `tomofield::SeriesFiles`,
+  or of a section of `tomofield::Options` (`options.fit.epochs`). `field` is `options.field.kind`.
 - The key is the name in the JSON beside a tomogram, under `options`, where every option has the
   value that was used.
 - An option with an automatic default takes the word `auto` as well.
@@ -66,7 +70,79 @@ std::string line_of(const Row& row) {
                      cell(default_text(row)), cell(row.help), row.name, row.key);
 }
 
+constexpr std::string_view kPythonHead =
+    R"(# Made by build/release/options_markdown --python from src/option_table/rows.cc: change that file.
+"""The options of a reconstruction, as keyword arguments of tomofield.reconstruct()."""
+
+import os
+from typing import Literal, Optional, Tuple, TypedDict, Union
+
+_Path = Union[str, "os.PathLike[str]"]
+
+
+class Options(TypedDict, total=False):
+    """Everything that a user can choose; docs/options.md lists units, ranges and defaults.
+
+    Options that may be None are chosen from the data or from the other options unless they are
+    given. Lengths on the specimen are unbinned pixels of the aligned view; lengths of the field are
+    binned pixels.
+    """
+)";
+
+// Returns the type of a value in Python.
+template <typename T>
+std::string python_type(const Row& row) {
+  if constexpr (std::is_enum_v<T>) {
+    std::vector<std::string> names;
+    for (const auto& [value, _] : base::EnumNames<T>::kNames)
+      names.push_back(fmt::format("\"{}\"", python_name_of(value)));
+    return fmt::format("Literal[{}]", fmt::join(names, ", "));
+  } else if constexpr (std::is_same_v<T, bool>) {
+    return "bool";
+  } else if constexpr (std::is_integral_v<T>) {
+    return row.range.kind == Range::Kind::kEither
+               ? fmt::format("Literal[{}, {}]", row.range.low, row.range.high)
+               : "int";
+  } else if constexpr (std::is_floating_point_v<T>) {
+    return "float";
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    return "str";
+  } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
+    return "_Path";
+  } else {
+    static_assert(std::is_same_v<T, Rectangle>);
+    return "Tuple[int, int, int, int]";
+  }
+}
+
+template <typename T>
+std::string type_of(const Row& row, Reference<T>) {
+  return python_type<T>(row);
+}
+template <typename T>
+std::string type_of(const Row& row, Reference<std::optional<T>>) {
+  return fmt::format("Optional[{}]", python_type<T>(row));
+}
+template <typename T>
+std::string type_of(const Row& row, Reference<Choice<T>>) {
+  return fmt::format("Optional[{}]", python_type<T>(row));
+}
+
 }  // namespace
+
+std::string options_python() {
+  std::string page(kPythonHead);
+  const Row* previous = nullptr;
+  for (const Row& row : all_rows()) {
+    if (row.name == "stack") continue;  // the first argument
+    if (previous == nullptr || previous->group != row.group)
+      page += fmt::format("\n    # {}\n", title_of(row.group));
+    page += fmt::format("    {}: {}\n", row.name,
+                        std::visit([&](auto member) { return type_of(row, member); }, row.member));
+    previous = &row;
+  }
+  return page;
+}
 
 std::string options_markdown() {
   std::string page(kIntroduction);

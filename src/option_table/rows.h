@@ -7,8 +7,10 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <variant>
 
+#include "base/enum_names.h"
 #include "tomofield/options.h"
 
 namespace tomofield::option_table {
@@ -55,16 +57,24 @@ enum class Group {
 };
 std::string_view title_of(Group group);
 
-/// Points to the value of an option. An std::optional without a value is chosen automatically.
-using Member = std::variant<
-    std::filesystem::path SeriesFiles::*, std::optional<std::filesystem::path> SeriesFiles::*,
-    bool Options::*, int Options::*, std::int64_t Options::*, std::uint64_t Options::*,
-    double Options::*, std::string Options::*, std::filesystem::path Options::*,
-    std::optional<bool> Options::*, std::optional<int> Options::*, std::optional<double> Options::*,
-    std::optional<Rectangle> Options::*, Contrast Options::*, Alignment Options::*,
-    std::optional<FieldKind> Options::*, TreeKind Options::*, std::optional<Activation> Options::*,
-    Engine Options::*, std::optional<Penalty> Options::*, std::optional<Prior> Options::*,
-    RingReference Options::*, NoiseModel Options::*, VoxelType Options::*, VolumeAxes Options::*>;
+/// The values of all options.
+struct Choices {
+  SeriesFiles files;
+  Options options;
+};
+
+/// Returns the value of an option. A Choice that is open, and an std::optional without a value, are
+/// chosen automatically.
+template <typename T>
+using Reference = T& (*)(Choices&);
+template <typename... T>
+using References = std::variant<Reference<T>...>;
+using Member =
+    References<std::filesystem::path, std::optional<std::filesystem::path>, bool, int, std::int64_t,
+               std::uint64_t, double, std::string, std::optional<int>, std::optional<double>,
+               std::optional<Rectangle>, Contrast, Alignment, TreeKind, Engine, RingReference,
+               NoiseModel, VoxelType, VolumeAxes, Choice<bool>, Choice<int>, Choice<double>,
+               Choice<FieldKind>, Choice<Activation>, Choice<Penalty>, Choice<Prior>>;
 
 /// Describes one option: the command line, the configuration file, the checks, the JSON, the
 /// fingerprint of a checkpoint and docs/options.md all read this row.
@@ -73,7 +83,8 @@ struct Row {
   std::string_view flag;  ///< "--epochs", "-o,--output", or "stack" for the positional argument;
                           ///< neighbours with one flag share it and are written as a list
   Member member;
-  std::string_view name;  ///< of the member, in C++ and Python
+  std::string_view section;  ///< the struct that has the member: "files", "options.fit"
+  std::string_view name;     ///< in Python; in C++ it is the member but for FieldOptions::kind
   Group group = Group::kSeries;
   std::string_view label = {};  ///< stands for the value in the help; empty: by the type
   std::string_view unit = {};
@@ -84,24 +95,58 @@ struct Row {
   bool is_required = false;  ///< the command line refuses to do without
 };
 
-/// Returns every option, one row a member of SeriesFiles and Options, ordered by group.
+/// Returns the name of an enum's value in Python: that of the command line, but for voxel types,
+/// which are named as numpy names them.
+template <typename Enum>
+std::string python_name_of(Enum value) {
+  if constexpr (std::is_same_v<Enum, VoxelType>) {
+    switch (value) {
+      case VoxelType::kFloat32:
+        return "float32";
+      case VoxelType::kFloat16:
+        return "float16";
+      case VoxelType::kInt16:
+        return "int16";
+    }
+  }
+  return base::name_of(value);
+}
+
+/// Returns true if somebody chose the value of an option that may be chosen automatically.
+template <typename T>
+bool is_chosen(const std::optional<T>& value) {
+  return value.has_value();
+}
+template <typename T>
+bool is_chosen(const Choice<T>& value) {
+  return !value.is_open();
+}
+
+/// Returns every option, one row a member of SeriesFiles and of the sections of Options, ordered by
+/// group.
 std::span<const Row> all_rows();
 
 /// Returns the row with this key. The key must be in the table.
 const Row& row_of(std::string_view key);
 
+/// Returns the rows with this flag, which is written as in the table: "-o,--output". Several rows
+/// share one whose value is a list, as --center does.
+std::span<const Row> rows_of_flag(std::string_view flag);
+
 /// Returns the flag that users type for a key of the JSON, or an empty text for an unknown key.
 std::string_view flag_of(std::string_view key);
 
 /// Calls `visit` with a reference to the value of an option and returns its result.
-template <typename Files, typename Values, typename Visit>
-decltype(auto) visit_value(const Row& row, Files& files, Values& options, Visit&& visit) {
+template <typename Visit>
+decltype(auto) visit_value(const Row& row, Choices& choices, Visit&& visit) {
+  return std::visit([&](auto reference) -> decltype(auto) { return visit(reference(choices)); },
+                    row.member);
+}
+template <typename Visit>
+decltype(auto) visit_value(const Row& row, const Choices& choices, Visit&& visit) {
   return std::visit(
-      [&]<typename T, typename Struct>(T Struct::*member) -> decltype(auto) {
-        if constexpr (std::is_same_v<Struct, SeriesFiles>)
-          return visit(files.*member);
-        else
-          return visit(options.*member);
+      [&](auto reference) -> decltype(auto) {
+        return visit(std::as_const(reference(const_cast<Choices&>(choices))));
       },
       row.member);
 }

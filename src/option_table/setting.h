@@ -1,22 +1,23 @@
 #pragma once
 
-#include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <span>
-#include <string>
+#include <vector>
+
+#include "option_table/rows.h"
+#include "tomofield/options.h"
 
 namespace tomofield::option_table {
 
-/// An option that a file of another program sets, and where it says so.
-struct Setting {
-  std::string option;          ///< as users type it: "--thickness", or "stack"
-  std::string value;           ///< as users type it; "true" for a flag
-  std::filesystem::path file;  ///< "TS_01/tilt.com"
-  std::string entry;           ///< the name in that file: "THICKNESS"
-  std::string row = {};        ///< the name of its row, if the file lists several series
-};
+/// Notes the settings that the files of a project made among the options, and gives the values that
+/// they set their origin.
+void note_settings(std::vector<Setting> settings, Choices& choices);
+
+/// Returns those of Options::settings whose values the options still have: a user may have gone
+/// over others.
+std::vector<Setting> settings_in_use(const Choices& choices);
 
 /// Returns settings as an array of objects with the members of Setting, for the metrics.
-nlohmann::json to_json(std::span<const Setting> settings);
+nlohmann::json settings_json(std::span<const Setting> settings);
 
 }  // namespace tomofield::option_table

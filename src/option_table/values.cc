@@ -7,9 +7,11 @@
 #include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <system_error>
 #include <type_traits>
 
+#include "base/check.h"
 #include "base/enum_names.h"
 #include "base/plausible.h"
 #include "base/utf8.h"
@@ -23,17 +25,27 @@ using nlohmann::json;
 constexpr std::string_view kAutomatic = "auto";
 
 template <typename T>
-inline constexpr bool kIsOptional = false;
+inline constexpr bool kIsChoice = false;
+template <typename T>
+inline constexpr bool kIsChoice<Choice<T>> = true;
+
+// Says whether a value may be absent or open.
+template <typename T>
+inline constexpr bool kIsOptional = kIsChoice<T>;
 template <typename T>
 inline constexpr bool kIsOptional<std::optional<T>> = true;
 
-// The type of a value, without the std::optional around it.
+// The type of a value, without the std::optional or the Choice around it.
 template <typename T>
 struct Plain {
   using type = T;
 };
 template <typename T>
 struct Plain<std::optional<T>> {
+  using type = T;
+};
+template <typename T>
+struct Plain<Choice<T>> {
   using type = T;
 };
 
@@ -117,20 +129,18 @@ requires std::is_enum_v<Enum> std::string read(std::string_view text, Enum& valu
   return {};
 }
 
-// An option that can be on, off or automatic.
-std::string read_optional(std::string_view text, std::optional<bool>& value) {
-  if (text != "on" && text != "off") return "auto, on or off";
-  value = text == "on";
-  return {};
-}
-
+// Reads a value that can also be automatic; a switch that can is on or off.
 template <typename T>
-std::string read_optional(std::string_view text, std::optional<T>& value) {
-  T found{};
-  const std::string wanted = read(text, found);
-  if (wanted.empty()) value = std::move(found);
-  if (wanted.empty() || std::is_same_v<T, Rectangle>) return wanted;
-  return (std::is_enum_v<T> ? "auto, " : "auto or ") + wanted;
+std::string read_chosen(std::string_view text, T& value) {
+  if constexpr (std::is_same_v<T, bool>) {
+    if (text != "on" && text != "off") return "auto, on or off";
+    value = text == "on";
+    return {};
+  } else {
+    const std::string wanted = read(text, value);
+    if (wanted.empty() || std::is_same_v<T, Rectangle>) return wanted;
+    return fmt::format("auto{} {}", std::is_enum_v<T> ? "," : " or", wanted);
+  }
 }
 
 std::string read(std::string_view text, std::optional<std::filesystem::path>& value) {
@@ -138,10 +148,11 @@ std::string read(std::string_view text, std::optional<std::filesystem::path>& va
   return {};
 }
 
+// Makes an option automatic again, with its usual value.
 template <typename T>
-std::string read(std::string_view text, std::optional<T>& value) {
-  if (text != kAutomatic) return read_optional(text, value);
-  value.reset();
+std::string set_default(const Row& row, Choice<T>& value) {
+  Choices usual;
+  value = std::get<Reference<Choice<T>>>(row.member)(usual);
   return {};
 }
 
@@ -164,7 +175,7 @@ requires(kIsNumber<T> || std::is_enum_v<T>) std::string write(T value) {
 template <typename T>
 json json_of(const T& value) {
   if constexpr (kIsOptional<T>)
-    return value ? json_of(*value) : json(nullptr);
+    return value.has_value() ? json_of(*value) : json(nullptr);
   else if constexpr (std::is_same_v<T, std::filesystem::path>)
     return base::utf8_text(value.string());
   else if constexpr (std::is_same_v<T, std::string>)
@@ -179,82 +190,80 @@ json json_of(const T& value) {
     return value;
 }
 
-template <typename T>
-void read_json(const json& source, T& value) {
-  if constexpr (kIsOptional<T>) {
-    if (source.is_null()) {
-      value.reset();
-      return;
-    }
-    typename Plain<T>::type found{};
-    read_json(source, found);
-    value = std::move(found);
-  } else if constexpr (std::is_same_v<T, Rectangle>) {
-    value = {source.at(0), source.at(1), source.at(2), source.at(3)};
-  } else if constexpr (std::is_same_v<T, VoxelType>) {
-    const std::string wanted = read(std::to_string(source.get<int>()), value);
-    if (!wanted.empty()) throw Error("must be " + wanted);
-  } else if constexpr (std::is_enum_v<T> || std::is_same_v<T, std::filesystem::path>) {
-    const std::string wanted = read(source.get<std::string>(), value);
-    if (!wanted.empty()) throw Error("must be " + wanted);
-  } else if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool>) {
-    if (!source.is_number_integer()) throw Error("must be a whole number");
-    const std::string wanted = read(source.dump(), value);
-    if (!wanted.empty()) throw Error("must be " + wanted);
-  } else {
-    value = source.get<T>();
-  }
-}
-
 json::json_pointer pointer_to(std::string_view key) {
-  std::string path = "/" + std::string(key);
+  std::string path = fmt::format("/{}", key);
   for (char& c : path)
     if (c == '.') c = '/';
   return json::json_pointer(path);
 }
 
-void require_known_keys(const json& section, const std::string& prefix) {
-  for (const auto& [name, value] : section.items()) {
-    const std::string key = prefix + name;
-    if (!flag_of(key).empty()) continue;
-    const bool is_section = value.is_object() && std::ranges::any_of(all_rows(), [&](const Row& r) {
-                              return r.key.starts_with(key + ".");
-                            });
-    if (!is_section)
-      throw Error(fmt::format("'{}' is no option: docs/options.md lists their names", key));
-    require_known_keys(value, key + ".");
-  }
-}
-
 }  // namespace
 
-std::string set_from_text(const Row& row, std::string_view text, Choices& choices) {
-  return visit_value(row, choices.files, choices.options,
-                     [&](auto& value) { return read(text, value); });
+std::string set_from_text(const Row& row, std::string_view text, Choices& choices, Origin origin) {
+  return visit_value(row, choices, [&]<typename T>(T& value) -> std::string {
+    using Value = typename Plain<T>::type;
+    if constexpr (std::is_same_v<T, std::optional<std::filesystem::path>> || !kIsOptional<T>) {
+      return read(text, value);
+    } else if constexpr (kIsChoice<T>) {
+      if (text == kAutomatic) return set_default(row, value);
+      Value found{};
+      std::string wanted = read_chosen(text, found);
+      if (wanted.empty()) value = {std::move(found), origin};
+      return wanted;
+    } else {
+      if (text == kAutomatic) value.reset();
+      if (text == kAutomatic) return {};
+      Value found{};
+      std::string wanted = read_chosen(text, found);
+      if (wanted.empty()) value = std::move(found);
+      return wanted;
+    }
+  });
+}
+
+std::string set_flag_from_text(std::string_view flag, const std::string& text, Choices& choices) {
+  const std::span<const Row> rows = rows_of_flag(flag);
+  TOMOFIELD_CHECK(!rows.empty(), std::string(flag));
+  if (rows.size() == 1) {
+    const bool turns_off = is_flag(rows.front()) && flag.starts_with("--no-");
+    return set_from_text(rows.front(), turns_off ? "false" : text, choices);
+  }
+  std::size_t begin = 0;
+  for (const Row& row : rows) {
+    const std::size_t end = text.find(',', begin);
+    const std::string wanted =
+        set_from_text(row, text.substr(begin, end == text.npos ? end : end - begin), choices);
+    if (!wanted.empty() || end == text.npos) return wanted;
+    begin = end + 1;
+  }
+  return fmt::format("at most {} numbers", rows.size());
 }
 
 std::optional<std::string> text_of(const Row& row, const Choices& choices) {
-  const auto text = visit_value(row, choices.files, choices.options,
-                                []<typename T>(const T& value) -> std::optional<std::string> {
-                                  if constexpr (std::is_same_v<T, std::optional<bool>>) {
-                                    if (!value) return std::nullopt;
-                                    return *value ? "on" : "off";
-                                  } else if constexpr (kIsOptional<T>) {
-                                    return value ? std::optional(write(*value)) : std::nullopt;
-                                  } else {
-                                    return write(value);
-                                  }
-                                });
+  const auto text =
+      visit_value(row, choices, []<typename T>(const T& value) -> std::optional<std::string> {
+        if constexpr (kIsChoice<T>) {
+          if (value.is_open()) return std::nullopt;
+          if constexpr (std::is_same_v<T, Choice<bool>>)
+            return *value ? "on" : "off";
+          else
+            return write(*value);
+        } else if constexpr (kIsOptional<T>) {
+          return value ? std::optional(write(*value)) : std::nullopt;
+        } else {
+          return write(value);
+        }
+      });
   return text && text->empty() ? std::nullopt : text;
 }
 
 std::string label_of(const Row& row) {
   if (!row.label.empty()) return std::string(row.label);
   const Choices none;
-  return visit_value(row, none.files, none.options, []<typename T>(const T&) -> std::string {
+  return visit_value(row, none, []<typename T>(const T&) -> std::string {
     using Value = typename Plain<T>::type;
     const std::string automatic = kIsOptional<T> ? "auto|" : "";
-    if constexpr (std::is_same_v<T, std::optional<bool>>)
+    if constexpr (std::is_same_v<T, Choice<bool>>)
       return "auto|on|off";
     else if constexpr (std::is_enum_v<Value>)
       return automatic + fmt::format("{}", fmt::join(names_of<Value>(), "|"));
@@ -267,13 +276,13 @@ std::string label_of(const Row& row) {
   });
 }
 
-bool is_flag(const Row& row) { return std::holds_alternative<bool Options::*>(row.member); }
+bool is_flag(const Row& row) { return std::holds_alternative<Reference<bool>>(row.member); }
 
 std::vector<std::string> range_faults(const Options& options) {
   std::vector<std::string> faults;
-  const SeriesFiles no_files;
+  const Choices choices{{}, options};
   for (const Row& row : all_rows()) {
-    visit_value(row, no_files, options, [&]<typename T>(const T& value) {
+    visit_value(row, choices, [&]<typename T>(const T& value) {
       using Value = typename Plain<T>::type;
       if constexpr (kIsNumber<Value>) {
         const auto require = [&](Value number) {
@@ -285,7 +294,7 @@ std::vector<std::string> range_faults(const Options& options) {
               is_huge ? fmt::format(" and at most {:g}", base::kLargestNumber) : "", number));
         };
         if constexpr (kIsOptional<T>) {
-          if (value) require(*value);
+          if (value.has_value()) require(*value);
         } else {
           require(value);
         }
@@ -295,38 +304,31 @@ std::vector<std::string> range_faults(const Options& options) {
   return faults;
 }
 
-json to_json(const SeriesFiles& files, const Options& options) {
+json to_json(const Choices& choices) {
   json all = json::object();
   for (const Row& row : all_rows()) {
     all[pointer_to(row.key)] =
-        visit_value(row, files, options, [](const auto& value) { return json_of(value); });
+        visit_value(row, choices, [](const auto& value) { return json_of(value); });
   }
   return all;
 }
 
-void from_json(const json& source, Choices& choices) {
-  require_known_keys(source, "");
-  Choices found = choices;
-  for (const Row& row : all_rows()) {
-    const auto pointer = pointer_to(row.key);
-    if (!source.contains(pointer)) continue;
-    try {
-      visit_value(row, found.files, found.options,
-                  [&](auto& value) { read_json(source.at(pointer), value); });
-    } catch (const nlohmann::json::exception&) {
-      throw Error(fmt::format("'{}' cannot be {}", row.key, source.at(pointer).dump()));
-    } catch (const Error& error) {
-      throw Error(fmt::format("'{}' {}, not {}", row.key, error.what(), source.at(pointer).dump()));
+Origin origin_of(const Row& row, const Choices& choices) {
+  return visit_value(row, choices, [&]<typename T>(const T& value) {
+    if constexpr (kIsChoice<T>) {
+      return value.origin();
+    } else {
+      Choices usual;
+      return value == std::get<Reference<T>>(row.member)(usual) ? Origin::kDefault : Origin::kGiven;
     }
-  }
-  choices = std::move(found);
+  });
 }
 
 void choose_by_contrast(Options& options) {
-  const bool is_dark = options.contrast == Contrast::kDark;
-  if (!options.fit_view_scale) options.fit_view_scale = is_dark;
-  if (!options.activation)
-    options.activation = is_dark ? Activation::kIdentity : Activation::kSoftplus;
+  const bool is_dark = options.views.contrast == Contrast::kDark;
+  if (options.fit.fit_view_scale.is_open())
+    options.fit.fit_view_scale = Choice<bool>::usual(is_dark);
+  options.field.activation.derive(is_dark ? Activation::kIdentity : Activation::kSoftplus);
 }
 
 }  // namespace tomofield::option_table

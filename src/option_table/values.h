@@ -11,17 +11,16 @@
 
 namespace tomofield::option_table {
 
-/// The values of all options.
-struct Choices {
-  SeriesFiles files;
-  Options options;
-};
-
 /// Sets an option to what a text says, as the command line and the configuration file write it:
 /// "24", "dark", "0,0,512,512", "auto" for options that can be chosen automatically, "true" and
-/// "false" for flags. Returns what the text must be if it cannot be read, else an empty text.
-/// Ranges are checked by range_faults().
-std::string set_from_text(const Row& row, std::string_view text, Choices& choices);
+/// "false" for flags. A Choice gets this origin. Returns what the text must be if it cannot be
+/// read, else an empty text. Ranges are checked by range_faults().
+std::string set_from_text(const Row& row, std::string_view text, Choices& choices,
+                          Origin origin = Origin::kGiven);
+
+/// Sets the rows of a flag, one from each part of a list ("--center 12,3"). A flag without a value
+/// takes "true". Returns what the text must be if it cannot be read, else an empty text.
+std::string set_flag_from_text(std::string_view flag, const std::string& text, Choices& choices);
 
 /// Returns the value of an option as set_from_text() reads it, or nothing if it is to be chosen
 /// automatically or is an empty text.
@@ -37,13 +36,13 @@ bool is_flag(const Row& row);
 /// not 0".
 std::vector<std::string> range_faults(const Options& options);
 
-/// Returns all options as nested objects, named after the keys of the table. Options that are to
-/// be chosen automatically are null.
-nlohmann::json to_json(const SeriesFiles& files, const Options& options);
+/// Returns all options as nested objects, named after the keys of the table. Options that have no
+/// value are null.
+nlohmann::json to_json(const Choices& choices);
 
-/// Reads what to_json() wrote. Keys that are absent keep their values. Throws Error for a key that
-/// is not in the table and for a value of the wrong type.
-void from_json(const nlohmann::json& source, Choices& choices);
+/// Returns where the value of an option comes from. One that is no Choice is given if it is not its
+/// default.
+Origin origin_of(const Row& row, const Choices& choices);
 
 /// Fills in the options whose automatic value depends on the contrast: the scale of the views and
 /// the activation.

@@ -8,130 +8,70 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <type_traits>
 #include <vector>
 
-#include "scratch_directory.h"
-#include "tomofield/error.h"
+#include "option_table/setting.h"
 
 namespace tomofield::option_table {
 namespace {
 
-// The addresses of all members. A member that is added does not compile here until it is named.
-std::vector<const void*> members_of(const Choices& choices) {
-  const auto& [stack, tlt, xf, xtilt, aln, mdoc, mask, fiducials, even, odd, ctf, mtf] =
-      choices.files;
-  const auto& [tilt_offset, x_axis_tilt, tilt_axis, exclude, ignore, bin, angpix, pixel_size,
-               contrast, take_log, log_base, black_level, bead_diameter, fixed_pattern, defocus,
-               phase_flipped, defocus_hand, voltage, spherical_aberration, amplitude_contrast,
-               dose_per_tilt, dose_weighted, thickness, roi, hand, axis_x, axis_z, shift_z,
-               with_margin, field, leaf_size, tree, leaf_budget, vertex_spacing, rank, activation,
-               margin_spacing, budget, tile_rows, epochs, vertex_epochs, coarse_epochs, coarse_bin,
-               subsets, engine, ray_samples, rays_per_step, learning_rate, density_variation,
-               factor_variation, penalty, denoise, prior, boundary, fourier, fourier_ring,
-               spike_rank, fit_noise, noise_model, fit_view_scale, hold_out, tune, patience, seed,
-               align, split_tilts, denoising_halves, voxel_type, axes, invert, zarr, output,
-               overwrite, resume, checkpoint_minutes, alignment_json] = choices.options;
-  return {&stack,
-          &tlt,
-          &xf,
-          &xtilt,
-          &aln,
-          &mdoc,
-          &mask,
-          &fiducials,
-          &even,
-          &odd,
-          &ctf,
-          &mtf,
-          &tilt_offset,
-          &x_axis_tilt,
-          &tilt_axis,
-          &exclude,
-          &ignore,
-          &bin,
-          &angpix,
-          &pixel_size,
-          &contrast,
-          &take_log,
-          &log_base,
-          &black_level,
-          &bead_diameter,
-          &fixed_pattern,
-          &defocus,
-          &phase_flipped,
-          &defocus_hand,
-          &voltage,
-          &spherical_aberration,
-          &amplitude_contrast,
-          &dose_per_tilt,
-          &dose_weighted,
-          &thickness,
-          &roi,
-          &hand,
-          &axis_x,
-          &axis_z,
-          &shift_z,
-          &with_margin,
-          &field,
-          &leaf_size,
-          &tree,
-          &leaf_budget,
-          &vertex_spacing,
-          &rank,
-          &activation,
-          &margin_spacing,
-          &budget,
-          &tile_rows,
-          &epochs,
-          &vertex_epochs,
-          &coarse_epochs,
-          &coarse_bin,
-          &subsets,
-          &engine,
-          &ray_samples,
-          &rays_per_step,
-          &learning_rate,
-          &density_variation,
-          &factor_variation,
-          &penalty,
-          &denoise,
-          &prior,
-          &boundary,
-          &fourier,
-          &fourier_ring,
-          &spike_rank,
-          &fit_noise,
-          &noise_model,
-          &fit_view_scale,
-          &hold_out,
-          &tune,
-          &patience,
-          &seed,
-          &align,
-          &split_tilts,
-          &denoising_halves,
-          &voxel_type,
-          &axes,
-          &invert,
-          &zarr,
-          &output,
-          &overwrite,
-          &resume,
-          &checkpoint_minutes,
-          &alignment_json};
+// Calls `note` with the address of each member of a struct. A member that is added does not compile
+// here until it is counted.
+template <typename Struct, typename Note>
+void note_members(const Struct& of, const Note& note) {
+  const auto note_all = [&](const auto&... member) { (note(&member), ...); };
+  if constexpr (std::is_same_v<Struct, SeriesFiles>) {
+    const auto& [m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11] = of;
+    note_all(m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11);
+  } else if constexpr (std::is_same_v<Struct, ViewOptions>) {
+    const auto& [m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17,
+                 m18, m19, m20, m21] = of;
+    note_all(m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17, m18,
+             m19, m20, m21);
+  } else if constexpr (std::is_same_v<Struct, SpecimenOptions>) {
+    const auto& [m0, m1, m2, m3, m4, m5] = of;
+    note_all(m0, m1, m2, m3, m4, m5);
+  } else if constexpr (std::is_same_v<Struct, FieldOptions>) {
+    const auto& [m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10] = of;
+    note_all(m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10);
+  } else if constexpr (std::is_same_v<Struct, FitOptions>) {
+    const auto& [m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17,
+                 m18, m19, m20, m21, m22, m23, m24, m25, m26] = of;
+    note_all(m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17, m18,
+             m19, m20, m21, m22, m23, m24, m25, m26);
+  } else if constexpr (std::is_same_v<Struct, VolumeOptions>) {
+    const auto& [m0, m1, m2, m3] = of;
+    note_all(m0, m1, m2, m3);
+  } else {
+    static_assert(std::is_same_v<Struct, RunOptions>);
+    const auto& [m0, m1, m2, m3, m4, m5] = of;
+    note_all(m0, m1, m2, m3, m4, m5);
+  }
+}
+
+std::multiset<const void*> members_of(const Choices& choices) {
+  std::multiset<const void*> members;
+  const auto note = [&](const void* member) { members.insert(member); };
+  note_members(choices.files, note);
+  note_members(choices.options.views, note);
+  note_members(choices.options.specimen, note);
+  note_members(choices.options.field, note);
+  note_members(choices.options.fit, note);
+  note_members(choices.options.volume, note);
+  note_members(choices.options.run, note);
+  return members;
 }
 
 const void* address_of(const Row& row, const Choices& choices) {
-  return visit_value(row, choices.files, choices.options,
-                     [](const auto& value) -> const void* { return &value; });
+  return visit_value(row, choices, [](const auto& value) -> const void* { return &value; });
 }
 
 TEST(OptionTable, HasEveryMemberOnce) {
   const Choices choices;
   std::multiset<const void*> in_table;
   for (const Row& row : all_rows()) in_table.insert(address_of(row, choices));
-  const std::vector<const void*> members = members_of(choices);
-  EXPECT_EQ(in_table, std::multiset<const void*>(members.begin(), members.end()));
+  EXPECT_EQ(in_table, members_of(choices));
 }
 
 TEST(OptionTable, KeysAndFlagsNameOneOption) {
@@ -183,47 +123,36 @@ Choices unusual_choices() {
   return choices;
 }
 
-void expect_same(const Choices& a, const Choices& b) {
-  for (const Row& row : all_rows()) EXPECT_EQ(text_of(row, a), text_of(row, b)) << row.key;
+TEST(OptionTable, JsonHasEveryValue) {
+  const Choices choices = unusual_choices();
+  const nlohmann::json json = to_json(choices);
+  EXPECT_EQ(json.at("fit").at("seed"), std::uint64_t{18446744073709551615u});
+  EXPECT_EQ(json.at("specimen").at("roi"), nlohmann::json({1, -2, 30, 40}));
+  EXPECT_EQ(json.at("volume").at("mode"), 12);
+  EXPECT_EQ(json.at("fit").at("epochs"), 37);
+  EXPECT_EQ(json.at("input").at("contrast"), "bright");
+  EXPECT_TRUE(to_json({}).at("input").at("angpix").is_null());
 }
 
-TEST(OptionTable, JsonKeepsEveryValue) {
-  for (const Choices& written : {unusual_choices(), Choices{}}) {
-    const nlohmann::json json = to_json(written.files, written.options);
-    Choices read = unusual_choices();
-    from_json(nlohmann::json::parse(json.dump()), read);
-    expect_same(read, written);
-    EXPECT_EQ(to_json(read.files, read.options), json);
-  }
-}
-
-TEST(OptionTable, JsonOfOneOptionLeavesOthersAlone) {
-  Choices choices;
-  from_json({{"fit", {{"epochs", 7}}}, {"volume", {{"mode", 1}}}}, choices);
-  Choices expected;
-  expected.options.epochs = 7;
-  expected.options.voxel_type = VoxelType::kInt16;
-  expect_same(choices, expected);
-}
-
-TEST(OptionTable, JsonThatIsWrongIsNamed) {
-  const auto refusal = [](const nlohmann::json& json) {
-    Choices choices;
-    const std::string message = testing::message_of<Error>([&] { from_json(json, choices); });
-    expect_same(choices, {});  // a refusal changes nothing
-    return message;
+TEST(OptionTable, ValuesSayWhereTheyComeFrom) {
+  const auto origin = [](const char* key, const Choices& choices) {
+    return origin_of(row_of(key), choices);
   };
-  EXPECT_EQ(refusal({{"fit", {{"epochz", 7}}}}),
-            "'fit.epochz' is no option: docs/options.md lists their names");
-  EXPECT_EQ(refusal({{"fitt", 1}}), "'fitt' is no option: docs/options.md lists their names");
-  EXPECT_EQ(refusal({{"fit", {{"subsets", 1.5}}}}),
-            "'fit.subsets' must be a whole number, not 1.5");
-  EXPECT_EQ(refusal({{"fit", {{"seed", -1}}}}), "'fit.seed' must be a whole number from 0, not -1");
-  EXPECT_EQ(refusal({{"field", {{"kind", "mesh"}}}}),
-            "'field.kind' must be vm or grid, not \"mesh\"");
-  EXPECT_EQ(refusal({{"fit", {{"engine", "ray"}, {"boundary", "much"}}}}),
-            "'fit.boundary' cannot be \"much\"");
-  EXPECT_EQ(refusal({{"volume", {{"mode", 3}}}}), "'volume.mode' must be 2, 12 or 1, not 3");
+  Choices choices;
+  for (const Row& row : all_rows()) EXPECT_EQ(origin_of(row, choices), Origin::kDefault) << row.key;
+  choices.options.fit.epochs = *choices.options.fit.epochs;
+  choices.options.fit.penalty.choose(Penalty::kSmooth);
+  choices.options.field.leaf_size.derive(64);
+  choices.options.fit.seed = 7;
+  EXPECT_EQ(origin("fit.epochs", choices), Origin::kGiven);
+  EXPECT_EQ(origin("fit.penalty", choices), Origin::kTrial);
+  EXPECT_EQ(origin("field.leaf_size", choices), Origin::kDerived);
+  EXPECT_EQ(origin("fit.seed", choices), Origin::kGiven);
+  choices.options.fit.epochs.derive(9);  // it is chosen already
+  EXPECT_EQ(choices.options.fit.epochs, *Options().fit.epochs);
+  note_settings({{"--tv", "3", "a.toml", "tv"}}, choices);
+  EXPECT_EQ(origin("fit.density_variation", choices), Origin::kProject);
+  EXPECT_EQ(choices.options.settings.size(), 1u);
 }
 
 TEST(OptionTable, TextsThatCannotBeReadSayWhatIsWanted) {
@@ -231,9 +160,9 @@ TEST(OptionTable, TextsThatCannotBeReadSayWhatIsWanted) {
     Choices choices;
     return set_from_text(row_of(key), text, choices);
   };
-  EXPECT_EQ(wanted("field.rank", "many"), "a whole number");
-  EXPECT_EQ(wanted("field.rank", "1.5"), "a whole number");
-  EXPECT_EQ(wanted("field.rank", ""), "a whole number");
+  EXPECT_EQ(wanted("fit.subsets", "many"), "a whole number");
+  EXPECT_EQ(wanted("fit.subsets", "1.5"), "a whole number");
+  EXPECT_EQ(wanted("fit.subsets", ""), "a whole number");
   EXPECT_EQ(wanted("fit.epochs", "99999999999"), "auto or a whole number that is not so large");
   EXPECT_EQ(wanted("fit.seed", "-1"), "a whole number from 0");
   EXPECT_EQ(wanted("fit.boundary", "4x"), "a number");
@@ -255,24 +184,24 @@ TEST(OptionTable, AutomaticOptionsTakeTheWordAuto) {
 
 TEST(OptionTable, EveryNumberIsCheckedAgainstItsRange) {
   Options good;
-  good.thickness = 100;
+  good.specimen.thickness = 100;
   EXPECT_EQ(range_faults(good), std::vector<std::string>());
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
-  const SeriesFiles no_files;
   int num_numbers = 0;
   for (const Row& row : all_rows()) {
     if (row.range.kind == Range::Kind::kAny) continue;
     for (const double bad : {nan, infinity, -1e7}) {
-      Options options = good;
-      visit_value(row, no_files, options, [&]<typename T>(T& value) {
-        if constexpr (std::is_same_v<T, double> || std::is_same_v<T, std::optional<double>>)
+      Choices choices{{}, good};
+      visit_value(row, choices, [&]<typename T>(T& value) {
+        if constexpr (std::is_same_v<T, double> || std::is_same_v<T, std::optional<double>> ||
+                      std::is_same_v<T, Choice<double>>)
           value = bad;
         else if constexpr (std::is_same_v<T, int> || std::is_same_v<T, std::int64_t> ||
-                           std::is_same_v<T, std::optional<int>>)
+                           std::is_same_v<T, std::optional<int>> || std::is_same_v<T, Choice<int>>)
           value = -10'000'000;
       });
-      const std::vector<std::string> faults = range_faults(options);
+      const std::vector<std::string> faults = range_faults(choices.options);
       ASSERT_EQ(faults.size(), 1u) << row.key;
       EXPECT_TRUE(faults[0].starts_with(std::string(flag_of(row.key)) + " must be " +
                                         row.range.text() + ", not "))
@@ -288,8 +217,8 @@ TEST(OptionTable, NumbersWithoutUpperLimitAreStillPlausible) {
   EXPECT_FALSE(Range::at_least(0).contains(1e10));
   EXPECT_FALSE(Range::above(0).contains(1e300));
   Options options;
-  options.thickness = 20;
-  options.density_variation = 1e300;
+  options.specimen.thickness = 20;
+  options.fit.density_variation = 1e300;
   const std::vector<std::string> faults = range_faults(options);
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_NE(faults[0].find("at most 1e+09"), std::string::npos) << faults[0];

@@ -25,4 +25,9 @@ double denoise_factor(const std::string& text) {
   return factor;
 }
 
+FitOptions with_denoise(FitOptions fit) {
+  fit.density_variation = fit.density_variation * denoise_factor(fit.denoise);
+  return fit;
+}
+
 }  // namespace tomofield::options

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "base/stopwatch.h"
-#include "fit/options.h"
 #include "measurement/prepare.h"
 #include "measurement/view_transfers.h"
 #include "option_table/setting.h"
@@ -19,41 +18,38 @@ namespace tomofield::options {
 
 /// Fills in the options that follow from other options: leaves, epochs, learning rate, weights,
 /// activation and the scale of views. If neither the penalty nor its weight is given, both stay
-/// empty, because trials choose them. `files` say whether a microscope filtered the views. Values
-/// out of range stay as they are; check_options() names them.
+/// open, because trials choose them. `files` say whether a microscope filtered the views. Values
+/// out of range stay as they are; faults() names them.
 Options resolve(const SeriesFiles& files, const Options& requested);
 
-/// Everything that a reconstruction is made from. run_options() makes it.
-struct ReconstructOptions {
+/// Everything that a reconstruction is made from: the options, resolved, and what the alignment
+/// before the fit adds to the files. run_options() makes it. Each layer takes its own section.
+struct ReconstructOptions : Options {
   SeriesFiles files;
-  Options requested;  ///< as they were given
-  Options resolved;   ///< the options that are used
-  /// The settings that trials choose. The trials start from those in `resolved`.
-  tune::OpenSettings open;
-  // The same options in the types of the layers below, with the constants of the method.
-  tilt_series::TiltSeriesOptions input;
-  measurement::SpecimenOptions specimen;
-  fit::FieldOptions field;
-  fit::FitOptions fit;
-  output::VolumeOptions volume;
-  /// Settings that the files of a project made, for the metrics; they are among the options.
-  std::vector<option_table::Setting> origins;
+  std::shared_ptr<const io::ImageStack> images = {};  ///< views in memory, in place of files.stack
+  /// [section]: changes of the alignment that the files give; empty: none.
+  std::vector<geometry::ViewCorrection> corrections = {};
+  std::vector<std::int64_t> left_out = {};  ///< sections, beside views.exclude
   /// Record of the alignment before the fit (realign/), for the metrics; null without one.
   nlohmann::json alignment = {};
   base::Stopwatch since_start = {};  ///< runs from run_options() on, before an alignment
 
+  /// Returns how the tilt series is read.
+  tilt_series::TiltSeriesOptions input() const;
+  /// Returns the settings that trials choose or have chosen. They start from the values that they
+  /// have.
+  tune::OpenSettings open_settings() const;
   /// Returns true if the run also makes two fits of one half of the data each.
-  bool makes_halves() const { return (files.even && files.odd) || resolved.split_tilts; }
+  bool makes_halves() const { return (files.even && files.odd) || fit.split_tilts; }
   /// Returns true if the run may be fitted by tiles, whose codes it keeps in a file.
-  bool may_use_tiles() const { return !resolved.budget.empty() && resolved.tile_rows != 0; }
+  bool may_use_tiles() const { return !field.budget.empty() && !(field.tile_rows == 0); }
   /// Returns the options of the longest fit: that with the learned prior if it is left to a trial.
   ReconstructOptions with_open_prior() const;
   /// Returns true if trials choose the weight of total variation, which --denoise multiplies.
-  bool chooses_weight() const { return resolved.tune || open.variation; }
+  bool chooses_weight() const { return fit.tune || fit.penalty.is_left_to_trials(); }
   /// Returns true if the fit filters views, which mixes their rows.
   bool filters_views() const {
-    return measurement::wants_transfers(files, resolved) ||
-           fit.noise_model == NoiseModel::kColoured;
+    return measurement::wants_transfers(files, views) || fit.noise_model == NoiseModel::kColoured;
   }
 
   /// Returns the expected number of trials before the fit, which choose the settings `to_choose`; 0

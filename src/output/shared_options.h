@@ -1,7 +1,7 @@
 #pragma once
 
-#include "measurement/prepare.h"
-#include "output/volume.h"
+#include "measurement/measurement.h"
+#include "output/model_file.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
 
@@ -11,13 +11,7 @@ namespace tomofield::output {
 /// files go beside the output, if there is one.
 tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Options& options);
 
-/// Returns what the options say of the specimen.
-measurement::SpecimenOptions specimen_options(const Options& options);
-
 /// Returns what densities that were fitted to a measurement mean.
 ModelInfo model_info(const measurement::Measurement& series, Contrast contrast);
-
-/// Returns how a volume is written, for the region of interest.
-VolumeOptions volume_options(const Options& options);
 
 }  // namespace tomofield::output

@@ -109,6 +109,18 @@ std::array<double, 3> origin_A(const ModelInfo& info, const OrientedBox& box, Vo
   return corner;
 }
 
+io::MrcMode mrc_mode(VoxelType type) {
+  switch (type) {
+    case VoxelType::kFloat32:
+      return io::MrcMode::kFloat32;
+    case VoxelType::kFloat16:
+      return io::MrcMode::kFloat16;
+    case VoxelType::kInt16:
+      return io::MrcMode::kInt16;
+  }
+  return io::MrcMode::kFloat32;
+}
+
 float largest_density(const VoxelSource& source, const distributed::Communicator& processes) {
   std::mutex mutex;
   float largest = 0.0f;
@@ -209,14 +221,14 @@ float largest_density(const Model& model) {
 }
 
 void write_volume(const Model& model, const VolumeOptions& options,
-                  const std::filesystem::path& path) {
-  const OrientedBox box = options.box.value_or(region_box(model, 1.0));
+                  const std::filesystem::path& path, const VolumePart& part) {
+  const OrientedBox box = part.box.value_or(region_box(model, 1.0));
   field::require_feasible(box);
   const Bounds bounds(box);
   require_inside(model, bounds);
-  if (options.box) warn_of_margin(model, bounds, 0.5 * box.voxel_px);
+  if (part.box) warn_of_margin(model, bounds, 0.5 * box.voxel_px);
   write_voxels([&](const field::BoxSink& sink) { sample_box(model, box, sink); }, box, model,
-               kMadeBy, options, path);
+               kMadeBy, options, path, distributed::Communicator::alone(), part.largest_density);
 }
 
 void write_volume(Model& model, const VolumeOptions& options, const std::filesystem::path& path,
@@ -237,27 +249,27 @@ void write_volume(Model& model, const VolumeOptions& options, const std::filesys
 
 void write_voxels(const VoxelSource& source, const OrientedBox& box, const ModelInfo& info,
                   const std::string& made_by, const VolumeOptions& options,
-                  const std::filesystem::path& path, const distributed::Communicator& processes) {
+                  const std::filesystem::path& path, const distributed::Communicator& processes,
+                  std::optional<float> largest) {
   const base::TraceSpan span("write volume");
   io::MrcSpec spec;
   spec.nx = box.size[0];
   spec.ny = box.size[1];
   spec.nz = box.size[2];
   if (options.axes == VolumeAxes::kXzy) std::swap(spec.ny, spec.nz);
-  spec.mode = options.mode;
+  spec.mode = mrc_mode(options.voxel_type);
   spec.voxel_size_A.fill(box.voxel_px * info.pixel_size_A);
   spec.origin_A = origin_A(info, box, options.axes);
   spec.labels = volume_labels(info, made_by);
 
   double scale = options.invert ? -info.output_scale() : info.output_scale();
-  if (options.mode == io::MrcMode::kInt16) {
+  if (options.voxel_type == VoxelType::kInt16) {
     { const io::MrcWriter probe(path, spec, processes); }  // refuses before the pass, not after it
     constexpr double kLargestStored = 32000.0;
-    const double largest =
-        std::abs(scale) * static_cast<double>(options.largest_density
-                                                  ? *options.largest_density
-                                                  : largest_density(source, processes));
-    const double factor = largest > 0 ? kLargestStored / largest : 1.0;
+    const double stored =
+        std::abs(scale) *
+        static_cast<double>(largest ? *largest : largest_density(source, processes));
+    const double factor = stored > 0 ? kLargestStored / stored : 1.0;
     spec.labels.front() += fmt::format(", stored = {:.6g} x value", factor);
     scale *= factor;
   }

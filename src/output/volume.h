@@ -15,13 +15,9 @@
 
 namespace tomofield::output {
 
-/// The options of a volume to write.
-struct VolumeOptions {
-  std::optional<field::OrientedBox> box;     ///< default: the region of interest, one voxel a pixel
-  io::MrcMode mode = io::MrcMode::kFloat32;  ///< kFloat32, kFloat16, or kInt16, which is scaled
-  VolumeAxes axes = VolumeAxes::kXyz;
-  bool invert = false;  ///< write the opposite of the input's contrast
-  bool zarr = false;    ///< write a copy as OME-Zarr beside the volume (zarr_path())
+/// The part of a model that is written.
+struct VolumePart {
+  std::optional<field::OrientedBox> box = {};  ///< default: region_box() with a voxel a pixel
   /// For kInt16: the density that becomes 32000, so that several volumes have one factor. Default:
   /// the largest one of the volume.
   std::optional<float> largest_density = {};
@@ -50,7 +46,7 @@ field::OrientedBox region_box(const ModelInfo& model, double voxel_px);
 /// factor. The write is atomic and replaces an old file. Throws Error before any work if `path`
 /// cannot be written or if the box lies outside of the model.
 void write_volume(const Model& model, const VolumeOptions& options,
-                  const std::filesystem::path& path);
+                  const std::filesystem::path& path, const VolumePart& part = {});
 
 /// One process's part of a model that several processes hold. write_volume() with it writes the
 /// region of interest in parallel: each process writes `rows`. A box that an x-axis tilt rotates is
@@ -68,10 +64,12 @@ void write_volume(Model& model, const VolumeOptions& options, const std::filesys
 /// kInt16. Each of several processes passes voxels of its own.
 using VoxelSource = std::function<void(const field::BoxSink&)>;
 
-/// Writes densities from any source as write_volume() does. `made_by` goes into the header's label.
+/// Writes densities from any source as write_volume() does. `made_by` goes into the header's label,
+/// and `largest` is VolumePart::largest_density.
 void write_voxels(const VoxelSource& source, const field::OrientedBox& box, const ModelInfo& info,
                   const std::string& made_by, const VolumeOptions& options,
                   const std::filesystem::path& path,
-                  const distributed::Communicator& processes = distributed::Communicator::alone());
+                  const distributed::Communicator& processes = distributed::Communicator::alone(),
+                  std::optional<float> largest = {});
 
 }  // namespace tomofield::output

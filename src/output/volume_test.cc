@@ -74,11 +74,11 @@ TEST(WriteVolume, AxesXzyTurnBackByImodsRotation) {
   const ScratchDirectory scratch;
   const auto model = uneven_model(FieldKind::kVm);
   VolumeOptions options;
-  options.box =
-      field::OrientedBox{.centre_px = {31.0, 44.0, 9.5}, .size = {30, 21, 15}, .voxel_px = 1.0};
-  write_volume(model, options, scratch / "xyz.mrc");
+  const VolumePart part{.box = field::OrientedBox{
+                            .centre_px = {31.0, 44.0, 9.5}, .size = {30, 21, 15}, .voxel_px = 1.0}};
+  write_volume(model, options, scratch / "xyz.mrc", part);
   options.axes = VolumeAxes::kXzy;
-  write_volume(model, options, scratch / "xzy.mrc");
+  write_volume(model, options, scratch / "xzy.mrc", part);
   const Written xyz = read(scratch / "xyz.mrc"), xzy = read(scratch / "xzy.mrc");
   ASSERT_EQ(xzy.header.ny, 15);
   ASSERT_EQ(xzy.header.nz, 21);
@@ -99,9 +99,9 @@ TEST(WriteVolume, ScalesIntegersAndSaysSo) {
   const auto model = uneven_model(FieldKind::kVm);
   VolumeOptions options;
   write_volume(model, options, scratch / "float.mrc");
-  options.mode = io::MrcMode::kInt16;
+  options.voxel_type = VoxelType::kInt16;
   write_volume(model, options, scratch / "int16.mrc");
-  options.mode = io::MrcMode::kFloat16;
+  options.voxel_type = VoxelType::kFloat16;
   write_volume(model, options, scratch / "float16.mrc");
   const Written exact = read(scratch / "float.mrc"), integers = read(scratch / "int16.mrc");
   const Written halves = read(scratch / "float16.mrc");
@@ -123,10 +123,11 @@ TEST(WriteVolume, RefusesWhatCannotBeWritten) {
   VolumeOptions options;
   EXPECT_NE(message_of<Error>([&] { write_volume(model, options, scratch / "no" / "out.mrc"); }),
             "");
-  options.box =
-      field::OrientedBox{.centre_px = {31.0, 44.0, 90.0}, .size = {30, 20, 15}, .voxel_px = 1.0};
+  const VolumePart part{.box = field::OrientedBox{.centre_px = {31.0, 44.0, 90.0},
+                                                  .size = {30, 20, 15},
+                                                  .voxel_px = 1.0}};
   const std::string message =
-      message_of<Error>([&] { write_volume(model, options, scratch / "out.mrc"); });
+      message_of<Error>([&] { write_volume(model, options, scratch / "out.mrc", part); });
   EXPECT_NE(message.find("its z runs from 82.5 to 97.5"), std::string::npos) << message;
   EXPECT_EQ(scratch.num_files(), 0u);
 }

@@ -50,7 +50,7 @@ double part_of_parameters(const fit::Domain& domain, FieldKind kind,
 // Returns the bytes of the parameters, their gradient and two moments in the stage with the most.
 // When an adaptive tree changes, all but the gradient are there twice.
 double fitted_bytes(const fit::Domain& domain, const std::vector<fit::Stage>& stages,
-                    const fit::FieldOptions& options, const distributed::Communicator& processes) {
+                    const FieldOptions& options, const distributed::Communicator& processes) {
   const double copies = options.tree == TreeKind::kAdaptive ? 7 : 4;
   double largest = 0;
   for (const fit::Stage& s : stages)
@@ -60,8 +60,7 @@ double fitted_bytes(const fit::Domain& domain, const std::vector<fit::Stage>& st
 
 // Returns the bytes in use while plain vertices become factors; 0 if they do not.
 double factorising_bytes(const fit::Domain& domain, const std::vector<fit::Stage>& stages,
-                         const fit::FieldOptions& options,
-                         const distributed::Communicator& processes) {
+                         const FieldOptions& options, const distributed::Communicator& processes) {
   if (stages.front().field_kind == options.kind) return 0;
   std::size_t largest = 0;
   for (const field::LeafShape& shape : domain.shapes)
@@ -132,18 +131,17 @@ std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domai
   return leaf + written;
 }
 
-int num_fitted_views(const measurement::Measurement& plan, const fit::FitOptions& options) {
+int num_fitted_views(const measurement::Measurement& plan, const FitOptions& options) {
   const auto held_out = measurement::held_out_views(plan.geometry.tilt_deg, options.hold_out);
   return plan.geometry.num_views() - static_cast<int>(held_out.size());
 }
 
-int steps_an_epoch(const measurement::Measurement& plan, const fit::FitOptions& options) {
+int steps_an_epoch(const measurement::Measurement& plan, const FitOptions& options) {
   if (plan.ray_geometry) return objective::ray_steps_per_epoch(options, plan.rays_shape());
   return std::min(options.subsets, num_fitted_views(plan, options));
 }
 
-std::size_t max_parameters(const fit::Domain& domain, const fit::FieldOptions& options,
-                           FieldKind kind) {
+std::size_t max_parameters(const fit::Domain& domain, const FieldOptions& options, FieldKind kind) {
   std::vector<field::LeafShape> shapes = domain.shapes, inside;
   for (int i = 0; i < domain.tree.num_leaves(); ++i) {
     if (domain.tree.leaf(i).region == field::Region::kInterest)
@@ -155,7 +153,7 @@ std::size_t max_parameters(const fit::Domain& domain, const fit::FieldOptions& o
   return field::count_parameters(kind, shapes);
 }
 
-double parameter_bytes(const fit::Domain& domain, const fit::FieldOptions& options, FieldKind kind,
+double parameter_bytes(const fit::Domain& domain, const FieldOptions& options, FieldKind kind,
                        const distributed::Communicator& processes) {
   return static_cast<double>(sizeof(float) * max_parameters(domain, options, kind)) *
          part_of_parameters(domain, kind, processes);

@@ -30,16 +30,15 @@ std::size_t estimate_memory(const PlannedFit& planned, const std::vector<fit::St
 /// Returns the bytes of a thread: the vertices of a leaf, and later a part of the volume.
 std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domain& domain);
 
-int num_fitted_views(const measurement::Measurement& plan, const fit::FitOptions& options);
-int steps_an_epoch(const measurement::Measurement& plan, const fit::FitOptions& options);
+int num_fitted_views(const measurement::Measurement& plan, const FitOptions& options);
+int steps_an_epoch(const measurement::Measurement& plan, const FitOptions& options);
 
 /// Returns the number of parameters as a field of this kind. An adaptive tree counts with all
 /// leaves of its budget.
-std::size_t max_parameters(const fit::Domain& domain, const fit::FieldOptions& options,
-                           FieldKind kind);
+std::size_t max_parameters(const fit::Domain& domain, const FieldOptions& options, FieldKind kind);
 
 /// Returns the bytes of the parameters of this process as a field of this kind.
-double parameter_bytes(const fit::Domain& domain, const fit::FieldOptions& options, FieldKind kind,
+double parameter_bytes(const fit::Domain& domain, const FieldOptions& options, FieldKind kind,
                        const distributed::Communicator& processes);
 
 }  // namespace tomofield::plan

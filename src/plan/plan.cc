@@ -32,7 +32,7 @@ std::size_t memory_of_alignment(const tilt_series::TiltSeries& series,
                                 const measurement::Measurement& plan,
                                 options::ReconstructOptions options,
                                 const distributed::Communicator& processes) {
-  const bool from_raw = options.resolved.align == Alignment::kFull;
+  const bool from_raw = options.run.align == Alignment::kFull;
   options.field = align::planned_field(options.field);
   options.fit = align::planned_fits(plan, from_raw, options.fit.seed).front().options;
   const fit::Domain domain = fit::make_domain(plan.geometry, plan.roi, options.field);
@@ -46,7 +46,7 @@ std::size_t memory_of_alignment(const tilt_series::TiltSeries& series,
 tilt_series::TiltSeries planned_series(const options::ReconstructOptions& options,
                                        const distributed::Communicator& processes) {
   const base::LogPause pause;
-  tilt_series::TiltSeriesOptions input = options.input;
+  tilt_series::TiltSeriesOptions input = options.input();
   input.look_at_views = false;
   return tilt_series::TiltSeries(input, processes);
 }
@@ -60,11 +60,11 @@ std::size_t memory_of_halves(const tilt_series::TiltSeries& series,
       domain, options.field, options.field.kind, distributed::Communicator::alone()));
   const base::Shape3 shape{plan.roi.width(), plan.roi.height(),
                            static_cast<std::int64_t>(plan.geometry.thickness)};
-  const std::size_t linear = options.resolved.denoising_halves
-                                 ? baseline::plan_baseline(series, {options.files, options.resolved,
-                                                                    baseline::WbpOptions{}})
-                                       .memory_bytes
-                                 : 0;
+  const std::size_t linear =
+      options.fit.denoising_halves
+          ? baseline::plan_baseline(series, {options.files, options, baseline::WbpOptions{}})
+                .memory_bytes
+          : 0;
   const std::size_t sampling =
       model + static_cast<std::size_t>(base::thread_count()) * thread_memory(plan, domain);
   return kProgramBytes + measurement::SlabViews::resident_memory(plan.rays_shape(), 0) +
@@ -77,13 +77,12 @@ void require_views_for_halves(const measurement::Measurement& plan,
                               const options::ReconstructOptions& options) {
   constexpr int kFewest = 8;
   const int num_views = num_fitted_views(plan, options.fit);
-  if (!options.resolved.split_tilts || num_views >= kFewest) return;
+  if (!options.fit.split_tilts || num_views >= kFewest) return;
   throw Error(
       fmt::format("--split-tilts needs {} views or more, and there are {}", kFewest, num_views));
 }
 
-void require_views_for_trials(const measurement::Measurement& plan,
-                              const fit::FitOptions& options) {
+void require_views_for_trials(const measurement::Measurement& plan, const FitOptions& options) {
   const std::vector<double>& tilt_deg = plan.geometry.tilt_deg;
   tune::trial_views(tilt_deg, measurement::held_out_views(tilt_deg, options.hold_out));
 }
@@ -127,16 +126,16 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const options::Reconstru
   run.num_parameters = max_parameters(domain, options.field, options.field.kind);
   run.stages = fit::make_stages(options.field, options.fit);
   const fit::Stage& last = run.stages.back();
+  const tune::OpenSettings open = options.open_settings();
   // Only the views tell whether there is a background or an undecided bead.
-  run.num_trials = options.num_trials(num_fitted_views(plan, options.fit),
-                                      {.variation = options.open.variation,
-                                       .spikes = options.open.spikes,
-                                       .view_scale = options.open.view_scale});
+  run.num_trials = options.num_trials(
+      num_fitted_views(plan, options.fit),
+      {.variation = open.variation, .spikes = open.spikes, .view_scale = open.view_scale});
   if (run.num_trials > 0) require_views_for_trials(plan, options.fit);
   run.steps_an_epoch = steps_an_epoch(plan, options.fit);
   run.num_steps = (last.first_epoch + last.epochs) * run.steps_an_epoch;
   run.tiles = plan_tiles({series, plan, domain, options, processes});
-  const bool aligns = options.resolved.align != Alignment::kOff;
+  const bool aligns = options.run.align != Alignment::kOff;
   if (aligns && options.alignment.is_null())
     align::require_views(static_cast<std::size_t>(run.num_views));
   run.memory_bytes = run.tiles.is_used()
@@ -172,7 +171,7 @@ RunPlan require_possible_run(const tilt_series::TiltSeries& series,
 
 void check_before_alignment(const options::ReconstructOptions& options,
                             const distributed::Communicator& processes) {
-  if (options.resolved.align == Alignment::kOff) return;
+  if (options.run.align == Alignment::kOff) return;
   const tilt_series::TiltSeries series = planned_series(options, processes);
   processes.run_collectively([&] { require_possible_run(series, options, processes); });
 }

@@ -19,14 +19,15 @@ constexpr int kNumViews = 15;
 class Plan : public ::testing::Test {
  protected:
   Plan() {
-    options_.input.contrast = Contrast::kBright;
-    options_.input.stack = testing::write_stack(scratch_ / "series.mrc", kWidth, kHeight, kNumViews,
+    options_.views.contrast = Contrast::kBright;
+    options_.files.stack = testing::write_stack(scratch_ / "series.mrc", kWidth, kHeight, kNumViews,
                                                 testing::some_value, 2.5);
     std::string tilts;
     for (int view = 0; view < kNumViews; ++view) tilts += std::to_string(8 * view - 56) + "\n";
-    options_.input.tlt = scratch_.write("series.tlt", tilts);
+    options_.files.tlt = scratch_.write("series.tlt", tilts);
     options_.specimen.thickness = 24;
-    options_.specimen.with_margin = false;
+    options_.fit.penalty = Penalty::kConcave;
+    options_.fit.fit_view_scale = false;
     options_.field.kind = FieldKind::kGrid;
     options_.field.leaf_size = 16;
     options_.field.with_margin = false;
@@ -34,7 +35,7 @@ class Plan : public ::testing::Test {
     options_.fit.subsets = 4;
   }
 
-  RunPlan plan() const { return plan_run(tilt_series::TiltSeries(options_.input), options_); }
+  RunPlan plan() const { return plan_run(tilt_series::TiltSeries(options_.input()), options_); }
 
   testing::ScratchDirectory scratch_;
   options::ReconstructOptions options_;
@@ -59,7 +60,7 @@ TEST_F(Plan, HasTheSizesOfTheSeriesAndTheField) {
 }
 
 TEST_F(Plan, BinnedViewsAndARegionOfInterestAreSmaller) {
-  options_.input.bin = 2;
+  options_.views.bin = 2;
   options_.specimen.roi = Rectangle{8, 4, 56, 44};
   const RunPlan run = plan();
   EXPECT_EQ(run.view_width, kWidth / 2);
@@ -92,16 +93,17 @@ TEST_F(Plan, AnEpochHasAtMostOneStepForEachFittedView) {
 
 TEST_F(Plan, CountsTheTrials) {
   EXPECT_EQ(plan().num_trials, 0);
-  options_.open.view_scale = true;
+  options_.fit.fit_view_scale = Choice<bool>::usual(false);
   EXPECT_EQ(plan().num_trials, 2);
-  options_.open.variation = true;
+  options_.fit.penalty = FitOptions().penalty;
+  options_.fit.spike_rank = 3;
   EXPECT_EQ(plan().num_trials, 5);
   options_.fit.hold_out = 3;  // 10 views are left, and short trials need 12
   EXPECT_EQ(plan().num_trials, 0);
-  options_.resolved.tune = true;
+  options_.fit.tune = true;
   EXPECT_GT(plan().num_trials, 2);
   options_.fit.hold_out = 2;
-  options_.input.exclude = "1-9";
+  options_.views.exclude = "1-9";
   const std::string message = testing::message_of<Error>([&] { plan(); });
   EXPECT_NE(message.find("views"), std::string::npos) << message;
 }
@@ -125,11 +127,11 @@ TEST_F(Plan, RefusesWhatTheMachineCannotHold) {
 }
 
 TEST_F(Plan, RefusesTooFewViewsForAnAlignmentBeforeIt) {
-  options_.resolved.align = Alignment::kRefine;
+  options_.run.align = Alignment::kRefine;
   plan();
   check_before_alignment(options_);
   check_alignment_alone(options_);
-  options_.input.exclude = "1-4";
+  options_.views.exclude = "1-4";
   const auto refusal = [](const auto& check) {
     const std::string message = testing::message_of<Error>(check);
     EXPECT_NE(message.find("at least 12 views"), std::string::npos) << message;
@@ -143,8 +145,8 @@ TEST_F(Plan, RefusesTooFewViewsForAnAlignmentBeforeIt) {
 }
 
 TEST_F(Plan, RefusesTooMuchMemoryBeforeAnAlignment) {
-  options_.resolved.align = Alignment::kRefine;
-  options_.input.stack =
+  options_.run.align = Alignment::kRefine;
+  options_.files.stack =
       testing::write_stack(scratch_ / "wide.mrc", 512, 512, kNumViews, testing::some_value, 2.5);
   options_.specimen.thickness = 1e6;
   const auto refusal = [](const auto& check) {
@@ -156,8 +158,8 @@ TEST_F(Plan, RefusesTooMuchMemoryBeforeAnAlignment) {
 }
 
 TEST_F(Plan, BeforeAnAlignmentIsSilent) {
-  options_.resolved.align = Alignment::kRefine;
-  options_.input.stack = testing::write_stack(scratch_ / "unscaled.mrc", kWidth, kHeight, kNumViews,
+  options_.run.align = Alignment::kRefine;
+  options_.files.stack = testing::write_stack(scratch_ / "unscaled.mrc", kWidth, kHeight, kNumViews,
                                               testing::some_value, 1.0);
   int num_messages = 0;
   base::set_log_sink([&](base::LogLevel, std::string_view) { ++num_messages; });

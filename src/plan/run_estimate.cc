@@ -77,8 +77,8 @@ struct Work {
   double filter_seconds = 0;    // of filtering views for surrogates
 
   // Adds the first epochs of a fit of at most `max_rows` rows, `times` times.
-  void add_fit(const measurement::Measurement& plan, const fit::FieldOptions& field,
-               const fit::FitOptions& fit, int steps_an_epoch, double max_rows, double times,
+  void add_fit(const measurement::Measurement& plan, const FieldOptions& field,
+               const FitOptions& fit, int steps_an_epoch, double max_rows, double times,
                std::int64_t epochs = std::numeric_limits<std::int64_t>::max()) {
     const bool has_filters = !plan.transfers.empty();
     for (const fit::Stage& stage : fit::make_stages(field, fit)) {
@@ -116,8 +116,8 @@ struct Work {
 void add_alignment(const measurement::Measurement& plan, const options::ReconstructOptions& options,
                    const RunPlan& run, Work& work) {
   constexpr double kAllRows = std::numeric_limits<double>::infinity();
-  const fit::FieldOptions field = align::planned_field(options.field);
-  const bool from_raw = options.resolved.align == Alignment::kFull;
+  const FieldOptions field = align::planned_field(options.field);
+  const bool from_raw = options.run.align == Alignment::kFull;
   for (const align::PlannedFits& fits : align::planned_fits(plan, from_raw, options.fit.seed)) {
     work.add_fit(plan, field, fits.options, run.steps_an_epoch, kAllRows, fits.times, fits.epochs);
     work.updates_of_views += fits.updates * fits.times * plan.geometry.num_views();
@@ -146,15 +146,15 @@ Work work_of(const measurement::Measurement& plan, const options::ReconstructOpt
   Work work{filters};
   work.add_fit(plan, options.field, options.fit, run.steps_an_epoch, kAllRows, run.num_fits);
   if (run.tiles.is_used()) add_rows_beside_tiles(plan, options, run, work);
-  if (options.resolved.align != Alignment::kOff) add_alignment(plan, options, run, work);
+  if (options.run.align != Alignment::kOff) add_alignment(plan, options, run, work);
   if (run.num_trials == 0) return work;
   const tune::TrialShape trial =
-      options.resolved.tune
+      options.fit.tune
           ? tune::trial_of_tune(options.field, options.fit)
           : tune::short_trial(options.field, options.fit, measurement::largest_reach_px(plan));
   work.add_fit(plan, trial.field, trial.fit, run.steps_an_epoch, static_cast<double>(trial.rows),
                run.num_trials);
-  if (options.open.prior) {
+  if (options.open_settings().prior) {
     const tune::TrialShape whole = tune::prior_trial(options.field, options.fit);
     work.add_fit(plan, whole.field, whole.fit, run.steps_an_epoch, static_cast<double>(whole.rows),
                  tune::kPriorTrials);
@@ -200,13 +200,12 @@ RunEstimate estimate_run(const tilt_series::TiltSeries& series,
                          const options::ReconstructOptions& given, const RunPlan& run) {
   const options::ReconstructOptions options = given.with_open_prior();
   measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
-  plan.transfers =
-      measurement::view_transfers(options.files, options.resolved, options.input, series);
+  plan.transfers = measurement::view_transfers(options.input(), options.specimen.hand, series);
   RunEstimate estimate;
   const auto num_fits = static_cast<std::size_t>(run.num_fits);
   const std::size_t parameters = sizeof(float) * run.num_parameters * num_fits;
   const auto volume = static_cast<std::size_t>(
-      num_voxels(run) * (options.volume.mode == io::MrcMode::kFloat32 ? 4 : 2));
+      num_voxels(run) * (options.volume.voxel_type == VoxelType::kFloat32 ? 4 : 2));
   // Beside the tomogram there are both halves, the uncertainty and the local resolution.
   const std::size_t num_volumes = run.num_fits == 1 ? 1 : 5;
   estimate.result_bytes = num_volumes * volume + parameters + kSmallFiles;
@@ -223,7 +222,7 @@ RunEstimate estimate_run(const tilt_series::TiltSeries& series,
   estimate.sample_steps = work.samples();
   if (options.field.leaf_size > kLargestLeaf) return estimate;
   const StepTimes times = measure_steps(plan, options.field, options.fit);
-  const bool aligns = options.resolved.align != Alignment::kOff;
+  const bool aligns = options.run.align != Alignment::kOff;
   const ViewTimes of_view = measure_view(series, aligns);
   // An alignment reads the series once more, as it was recorded.
   const double readings = aligns ? 2.0 : 1.0;

@@ -23,26 +23,26 @@ class Estimate : public ::testing::Test {
     std::string tilts;
     for (int view = 0; view < kNumViews; ++view) tilts += std::to_string(8 * view - 56) + "\n";
     files_.tlt = scratch_.write("series.tlt", tilts);
-    options_.contrast = Contrast::kBright;
-    options_.thickness = 24;
-    options_.with_margin = false;
-    options_.leaf_size = 16;
-    options_.epochs = 2;
-    options_.coarse_epochs = 0;
-    options_.density_variation = 5;
-    options_.penalty = Penalty::kConcave;
-    options_.fit_view_scale = false;
-    options_.black_level = 0;
-    options_.output = scratch_ / "out.mrc";
+    options_.views.contrast = Contrast::kBright;
+    options_.specimen.thickness = 24;
+    options_.field.with_margin = false;
+    options_.field.leaf_size = 16;
+    options_.fit.epochs = 2;
+    options_.fit.coarse_epochs = 0;
+    options_.fit.density_variation = 5;
+    options_.fit.penalty = Penalty::kConcave;
+    options_.fit.fit_view_scale = false;
+    options_.views.black_level = 0;
+    options_.run.output = scratch_ / "out.mrc";
   }
 
   RunPlan plan() const {
     const options::ReconstructOptions run = options::run_options(files_, options_);
-    return plan_run(tilt_series::TiltSeries(run.input), run);
+    return plan_run(tilt_series::TiltSeries(run.input()), run);
   }
   RunEstimate estimate() const {
     const options::ReconstructOptions run = options::run_options(files_, options_);
-    const tilt_series::TiltSeries series(run.input);
+    const tilt_series::TiltSeries series(run.input());
     return estimate_run(series, run, plan_run(series, run));
   }
 
@@ -52,9 +52,9 @@ class Estimate : public ::testing::Test {
 };
 
 TEST_F(Estimate, CountsTheSamplesOfAllSteps) {
-  options_.field = FieldKind::kGrid;
+  options_.field.kind = FieldKind::kGrid;
   const RunEstimate two_epochs = estimate();
-  options_.epochs = 6;
+  options_.fit.epochs = 6;
   const RunEstimate six_epochs = estimate();
   EXPECT_DOUBLE_EQ(six_epochs.sample_steps, 3 * two_epochs.sample_steps);
   // An epoch has a step for every view, of all voxels and some padding.
@@ -65,33 +65,33 @@ TEST_F(Estimate, CountsTheSamplesOfAllSteps) {
 
 TEST_F(Estimate, TrialsAndFactorsAreMoreWork) {
   const double alone = estimate().sample_steps;
-  options_.penalty.reset();
-  options_.density_variation.reset();
+  options_.fit.penalty = FitOptions().penalty;
+  options_.fit.density_variation = FitOptions().density_variation;
   EXPECT_GT(estimate().sample_steps, alone);
-  options_.field = FieldKind::kVm;
+  options_.field.kind = FieldKind::kVm;
   ASSERT_TRUE(estimate().core_seconds.has_value());
   EXPECT_GT(*estimate().core_seconds, 0);
 }
 
 TEST_F(Estimate, AnAlignmentIsMoreWork) {
   const double alone = estimate().sample_steps;
-  options_.align = Alignment::kRefine;
+  options_.run.align = Alignment::kRefine;
   const double refined = estimate().sample_steps;
   EXPECT_GT(refined, alone);
-  options_.align = Alignment::kFull;
+  options_.run.align = Alignment::kFull;
   EXPECT_GT(estimate().sample_steps, refined);
 }
 
 TEST_F(Estimate, FilteredViewsAreMoreWorkAndMemory) {
-  options_.pixel_size_A = 10;
+  options_.views.pixel_size_A = 10;
   const double alone = estimate().sample_steps;
   const std::size_t memory = plan().memory_bytes;
-  options_.defocus_um = 4;
+  options_.views.defocus_um = 4;
   EXPECT_GT(estimate().sample_steps, alone);
   EXPECT_GT(plan().memory_bytes, memory);
   // A dose filters the views as well.
-  options_.defocus_um.reset();
-  options_.dose_per_tilt = 3;
+  options_.views.defocus_um.reset();
+  options_.views.dose_per_tilt = 3;
   EXPECT_GT(estimate().sample_steps, alone);
 }
 
@@ -100,12 +100,12 @@ TEST_F(Estimate, DiskHoldsTheResultsAndTwoCheckpoints) {
   const auto voxels = static_cast<std::size_t>(kSize * kSize * 24);
   EXPECT_GT(estimated.result_bytes, 4 * voxels);
   EXPECT_GT(estimated.disk_bytes, estimated.result_bytes);
-  options_.voxel_type = VoxelType::kFloat16;
+  options_.volume.voxel_type = VoxelType::kFloat16;
   EXPECT_EQ(estimate().result_bytes, estimated.result_bytes - 2 * voxels);
 }
 
 TEST_F(Estimate, TheTimeOfTheRayEngineIsNotKnown) {
-  options_.engine = Engine::kRay;
+  options_.fit.engine = Engine::kRay;
   EXPECT_FALSE(estimate().core_seconds.has_value());
 }
 

@@ -28,7 +28,7 @@ constexpr std::int64_t kStepsOfLastStage = 6;
 
 // Returns rays of noise with the views of `plan`, in a part of its volume.
 measurement::Measurement small_measurement(const measurement::Measurement& plan,
-                                           const fit::FieldOptions& field) {
+                                           const FieldOptions& field) {
   const std::int64_t width = std::min(plan.geometry.width, kMostColumns);
   const int bands = std::min(base::thread_count(), kMostBands);
   const std::int64_t rows = std::min(plan.roi.height(), bands * fit::band_rows(field));
@@ -50,10 +50,10 @@ measurement::Measurement small_measurement(const measurement::Measurement& plan,
 }
 
 // Returns the options of a fit with one epoch a stage.
-fit::FitOptions one_epoch_a_stage(const std::vector<fit::Stage>& stages, fit::FitOptions options) {
+FitOptions one_epoch_a_stage(const std::vector<fit::Stage>& stages, FitOptions options) {
   options.coarse_epochs = static_cast<int>(
       std::ranges::count_if(stages, [](const fit::Stage& stage) { return stage.bin > 1; }));
-  options.vertex_epochs = std::min(options.vertex_epochs, 1);
+  options.vertex_epochs = std::min(*options.vertex_epochs, 1);
   options.epochs = 1;
   options.hold_out = 0;
   options.patience = 0;
@@ -92,19 +92,19 @@ StepTime line_through(double coarse_samples, double coarse_seconds, double fine_
 }  // namespace
 
 double samples_of(const fit::Stage& stage, const measurement::Measurement& plan,
-                  const fit::FieldOptions& field, double max_rows) {
+                  const FieldOptions& field, double max_rows) {
   const fit::Domain domain = fit::make_domain(plan.geometry, plan.roi, field);
   const double rows = std::min(static_cast<double>(domain.num_rows), max_rows) / stage.bin;
   return std::ceil(rows / kernels::kLanes) *
          static_cast<double>(sample_grid(domain, plan.geometry.thickness, stage.bin).size());
 }
 
-StepTimes measure_steps(const measurement::Measurement& plan, const fit::FieldOptions& field,
-                        const fit::FitOptions& fit) {
+StepTimes measure_steps(const measurement::Measurement& plan, const FieldOptions& field,
+                        const FitOptions& fit) {
   const measurement::Measurement small = small_measurement(plan, field);
-  fit::FieldOptions inside = field;
+  FieldOptions inside = field;
   inside.with_margin = false;
-  const fit::FitOptions options = one_epoch_a_stage(fit::make_stages(field, fit), fit);
+  const FitOptions options = one_epoch_a_stage(fit::make_stages(field, fit), fit);
   fit::Fit fitted(small, inside, options);
   const std::vector<double> seconds = seconds_of_steps(fitted);
   const std::vector<fit::Stage>& stages = fitted.stages();

@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "fit/options.h"
 #include "fit/stages.h"
 #include "measurement/measurement.h"
+#include "tomofield/options.h"
 
 namespace tomofield::plan {
 
@@ -20,11 +20,11 @@ struct StepTimes {
 
 /// Returns the samples of all slabs of a stage of a fit to `plan`, on at most `max_rows` rows.
 double samples_of(const fit::Stage& stage, const measurement::Measurement& plan,
-                  const fit::FieldOptions& field, double max_rows);
+                  const FieldOptions& field, double max_rows);
 
 /// Measures the steps of a fit in a small volume, of noise, with the views and the stages of
 /// `plan`, which has no rays and is not of raw views. Takes a fraction of a second.
-StepTimes measure_steps(const measurement::Measurement& plan, const fit::FieldOptions& field,
-                        const fit::FitOptions& fit);
+StepTimes measure_steps(const measurement::Measurement& plan, const FieldOptions& field,
+                        const FitOptions& fit);
 
 }  // namespace tomofield::plan

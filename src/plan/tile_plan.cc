@@ -53,7 +53,7 @@ int num_whole_stages(const fit::Domain& domain, const std::vector<fit::Stage>& s
 
 // Returns the bytes of the codes of all tiles.
 double code_bytes(const PlannedFit& planned) {
-  const compact::Budget budget = compact::parse_budget(planned.options.resolved.budget);
+  const compact::Budget budget = compact::parse_budget(planned.options.field.budget);
   if (budget.kind == compact::Budget::Kind::kDecibels)
     return kCodesOfAVertex * vertices_of(planned.domain.shapes);
   return budget.amount;
@@ -131,8 +131,8 @@ TilePlan tiles_for_memory(const PlannedFit& planned) {
 // Returns the rows of the tiles of the run that is resumed, if there is one (0: the whole region).
 std::optional<int> rows_of_resumed_run(const options::ReconstructOptions& options) {
   std::optional<int> rows;
-  if (!options.resolved.resume) return rows;
-  const output::OutputPaths paths = output::output_paths(options.resolved.output);
+  if (!options.run.resume) return rows;
+  const output::OutputPaths paths = output::output_paths(options.run.output);
   for (const std::filesystem::path& file : {paths.model, paths.tiles})
     if (!rows && std::filesystem::exists(file))
       checkpoint::read_checkpoint([&] { rows = checkpoint::stored_tile_rows(file); });
@@ -159,8 +159,9 @@ double TilePlan::repeats() const {
 
 TilePlan plan_tiles(const PlannedFit& planned) {
   const options::ReconstructOptions& options = planned.options;
-  std::optional<int> rows = options.resolved.tile_rows;
-  if (rows == 0 || (!rows && options.resolved.budget.empty())) return {};
+  std::optional<int> rows;
+  if (options.field.tile_rows.has_value()) rows = *options.field.tile_rows;
+  if (rows == 0 || (!rows && options.field.budget.empty())) return {};
   if (const char* const fault = fault_of_tiles(planned)) {
     if (rows) throw Error(fault);
     return {};

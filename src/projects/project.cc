@@ -86,8 +86,7 @@ bool Project::ignores(std::string_view entry) {
 void Project::set(std::string_view option, std::string value, const fs::path& file,
                   std::string_view entry, std::string row) {
   if (ignores(entry)) return;
-  const bool is_new =
-      std::ranges::find(settings_, option, &option_table::Setting::option) == settings_.end();
+  const bool is_new = std::ranges::find(settings_, option, &Setting::option) == settings_.end();
   TOMOFIELD_CHECK(is_new, fmt::format("{} is set twice", option));
   settings_.push_back(
       {std::string(option), std::move(value), file, std::string(entry), std::move(row)});

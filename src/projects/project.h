@@ -26,7 +26,7 @@ class Project {
   explicit Project(const Request& request) : request_(request) {}
 
   const Request& request() const { return request_; }
-  const std::vector<option_table::Setting>& settings() const { return settings_; }
+  const std::vector<Setting>& settings() const { return settings_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
   const std::vector<std::filesystem::path>& files() const { return files_; }
 
@@ -51,7 +51,7 @@ class Project {
 
  private:
   Request request_;
-  std::vector<option_table::Setting> settings_;
+  std::vector<Setting> settings_;
   std::vector<std::string> warnings_;
   std::vector<std::filesystem::path> files_;
   std::vector<std::string> met_;  ///< entries that ignores() was asked for

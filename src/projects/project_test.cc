@@ -91,8 +91,7 @@ TEST(ImodProject, RawStackWithItsTransforms) {
                                    {"--log", "true"}}));
   EXPECT_EQ(imod.warnings(), "");
   const Project project = imod.read();
-  const auto& thickness =
-      *std::ranges::find(project.settings(), "--thickness", &option_table::Setting::option);
+  const auto& thickness = *std::ranges::find(project.settings(), "--thickness", &Setting::option);
   EXPECT_EQ(thickness.file, imod.folder / "tilt.com");
   EXPECT_EQ(thickness.entry, "THICKNESS");
 }

@@ -128,11 +128,11 @@ align::Alignment align_views(const tilt_series::TiltSeries& series,
       .plan = measurement::plan_realigned(series, options.specimen, processes),
       .field = options.field,
       .seed = options.fit.seed,
-      .scratch_dir = options.input.scratch_dir,
+      .scratch_dir = options.input().scratch_dir,
       .progress = hooks.progress,
       .stop_requested = hooks.stop_requested};
   std::vector<geometry::ViewCorrection> start(series.views().size());
-  if (options.resolved.align == Alignment::kFull)
+  if (options.run.align == Alignment::kFull)
     start = align::with_best_axis(problem, align::correlated_start(problem), processes);
   align::Alignment found = align::refine_alignment(problem, std::move(start), processes);
   if (!found.beads) log_unused_beads(series.mask_metrics());
@@ -144,14 +144,14 @@ json make_record(const options::ReconstructOptions& options, const tune::TuneHoo
                  const distributed::Communicator& processes) {
   const base::TraceSpan span("align series");
   const base::Stopwatch running;
-  tilt_series::TiltSeriesOptions recorded = options.input;
+  tilt_series::TiltSeriesOptions recorded = options.input();
   recorded.resample = false;
-  recorded.halves.reset();
+  recorded.even.reset();
   const tilt_series::TiltSeries series(recorded, processes);
   align::require_views(series.views().size());
   const align::Alignment found = align_views(series, options, hooks, processes);
   const bool is_clean = found.unaligned.empty();
-  if (is_clean || options.resolved.align != Alignment::kFull ||
+  if (is_clean || options.run.align != Alignment::kFull ||
       series.views().size() - found.unaligned.size() < align::kFewestViews)
     return alignment_record(series, found, running.seconds());
 
@@ -173,11 +173,11 @@ json make_record(const options::ReconstructOptions& options, const tune::TuneHoo
 
 bool align_series(options::ReconstructOptions& options, const tune::TuneHooks& hooks,
                   const distributed::Communicator& processes) {
-  if (options.resolved.align == Alignment::kOff) return true;
-  const std::filesystem::path path = output::output_paths(options.resolved.output).alignment;
+  if (options.run.align == Alignment::kOff) return true;
+  const std::filesystem::path path = output::output_paths(options.run.output).alignment;
   json origin, record;
   processes.run_collectively([&] { origin = alignment_origin(options); });
-  if (options.resolved.resume && std::filesystem::exists(path)) {
+  if (options.run.resume && std::filesystem::exists(path)) {
     processes.run_collectively([&] { record = read_alignment_record(path, origin); });
   } else {
     try {
@@ -187,7 +187,7 @@ bool align_series(options::ReconstructOptions& options, const tune::TuneHooks& h
     }
     record.update(origin);
     processes.run_collectively([&] {
-      if (processes.is_root() && !options.resolved.output.empty()) io::write_json(path, record);
+      if (processes.is_root() && !options.run.output.empty()) io::write_json(path, record);
     });
   }
   apply_alignment(record, options);

@@ -85,14 +85,14 @@ std::string checksum_of_pixels(const io::ImageStack& stack, const std::string& e
 }
 
 json series_json(const options::ReconstructOptions& options) {
-  const auto stack = tilt_series::open_views(options.input);
+  const auto stack = tilt_series::open_views(options.input());
   const io::MrcHeader& header = stack->header();
   const std::span tilts(header.extended_tilt_deg);
   return {{"sections", header.nz},
           {"size_px", {header.nx, header.ny}},
           {"files", checksums_of_files(options.files)},
           {"header_tilts", hex(base::xxhash64(std::as_bytes(tilts)))},
-          {"pixels", checksum_of_pixels(*stack, options.input.exclude)}};
+          {"pixels", checksum_of_pixels(*stack, options.views.exclude)}};
 }
 
 // Returns the options that decide what the alignment finds.
@@ -101,7 +101,7 @@ json relevant_options(const options::ReconstructOptions& options) {
   json& input = all["input"];
   for (const char* unused : {"stack", "even", "odd"}) input.erase(unused);
   for (const auto& named : small_files(options.files)) input.erase(named.first);
-  const fit::FieldOptions field = align::planned_field(options.field);
+  const FieldOptions field = align::planned_field(options.field);
   return {{"input", input},
           {"specimen", all["specimen"]},
           {"align", all["fit"]["align"]},
@@ -350,12 +350,12 @@ json read_alignment_record(const std::filesystem::path& path, const json& origin
 }
 
 void apply_alignment(const json& record, options::ReconstructOptions& options) {
-  auto& corrections = options.input.corrections;
+  auto& corrections = options.corrections;
   corrections.assign(record.at("series").at("sections").get<std::size_t>(), {});
   for (const json& view : record.at("views")) {
     const auto section = view.at("section").get<std::int64_t>() - 1;
     corrections[static_cast<std::size_t>(section)] = correction_of(view, record);
-    if (view.at("left_out").get<bool>()) options.input.left_out.push_back(section);
+    if (view.at("left_out").get<bool>()) options.left_out.push_back(section);
   }
   options.alignment = record;
 }

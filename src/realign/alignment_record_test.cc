@@ -26,7 +26,9 @@ class AlignmentRecord : public ::testing::Test {
  protected:
   AlignmentRecord() {
     write_series(scratch_.path(), 0);
-    record_ = alignment_record(tilt_series::TiltSeries(run().input), found(), 1.5);
+    tilt_series::TiltSeriesOptions input = run().input();
+    input.look_at_views = false;
+    record_ = alignment_record(tilt_series::TiltSeries(input), found(), 1.5);
     record_.update(alignment_origin(run()));
     io::write_json(file_, record_);
   }
@@ -48,16 +50,14 @@ class AlignmentRecord : public ::testing::Test {
     SeriesFiles files;
     files.stack = folder / "series.mrc";
     files.tlt = folder / "series.tlt";
-    options::ReconstructOptions all = options::run_options(files, options);
-    all.input.look_at_views = false;
-    return all;
+    return options::run_options(files, options);
   }
 
   static Options some_options() {
     Options options;
-    options.contrast = Contrast::kBright;
-    options.thickness = 16;
-    options.align = Alignment::kRefine;
+    options.views.contrast = Contrast::kBright;
+    options.specimen.thickness = 16;
+    options.run.align = Alignment::kRefine;
     return options;
   }
 
@@ -100,8 +100,8 @@ TEST_F(AlignmentRecord, IsReadAsItWasWritten) {
   const json read = read_alignment_record(file_, alignment_origin(options));
   EXPECT_EQ(read, record_);
   apply_alignment(read, options);
-  EXPECT_EQ(options.input.corrections, found().corrections);
-  EXPECT_EQ(options.input.left_out, (std::vector<std::int64_t>{2}));
+  EXPECT_EQ(options.corrections, found().corrections);
+  EXPECT_EQ(options.left_out, (std::vector<std::int64_t>{2}));
 }
 
 TEST_F(AlignmentRecord, IsOfOneSeries) {
@@ -126,14 +126,14 @@ TEST_F(AlignmentRecord, IsOfTheOptionsThatItDependsOn) {
     return refusal(run_of(scratch_.path(), options));
   };
   for (const std::string& message :
-       {refusal_with([](Options& options) { options.align = Alignment::kFull; }),
-        refusal_with([](Options& options) { options.with_margin = false; }),
-        refusal_with([](Options& options) { options.vertex_spacing = 2; }),
-        refusal_with([](Options& options) { options.thickness = 20; }),
-        refusal_with([](Options& options) { options.seed = 2; })})
+       {refusal_with([](Options& options) { options.run.align = Alignment::kFull; }),
+        refusal_with([](Options& options) { options.field.with_margin = false; }),
+        refusal_with([](Options& options) { options.field.vertex_spacing = 2; }),
+        refusal_with([](Options& options) { options.specimen.thickness = 20; }),
+        refusal_with([](Options& options) { options.fit.seed = 2; })})
     EXPECT_NE(message.find("other options"), std::string::npos) << message;
-  EXPECT_EQ(refusal_with([](Options& options) { options.epochs = 3; }), "");
-  EXPECT_EQ(refusal_with([](Options& options) { options.vertex_spacing = 0.5; }), "");
+  EXPECT_EQ(refusal_with([](Options& options) { options.fit.epochs = 3; }), "");
+  EXPECT_EQ(refusal_with([](Options& options) { options.field.vertex_spacing = 0.5; }), "");
 }
 
 TEST_F(AlignmentRecord, KnowsThatNoneIsNoFile) {

@@ -16,8 +16,9 @@
 #include "io/saving/output_set.h"
 #include "output/output_paths.h"
 #include "output/volume.h"
-#include "reconstruct/half_measurement.h"
+#include "reconstruct/halves.h"
 #include "reconstruct/run_files.h"
+#include "reconstruct/run_pages.h"
 #include "report/choice_plot.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
@@ -51,32 +52,32 @@ evaluate::TiltRange tilt_range(const Run& run) {
 // Samples one model after the other. Scaled integers have one factor in all volumes, so that these
 // compare.
 void write_volumes(const Run& run) {
-  output::VolumeOptions options = run.options.volume;
+  VolumeOptions options = run.options.volume;
+  output::VolumePart part;
   std::vector<std::pair<std::filesystem::path, std::filesystem::path>> volumes_of_models{
       {run.paths.model, run.paths.volume}};
   for (const Half half : tilt_series::kBothHalves)
     volumes_of_models.emplace_back(paths_of(run, half).model, paths_of(run, half).volume);
-  if (options.mode == io::MrcMode::kInt16) {
+  if (options.voxel_type == VoxelType::kInt16) {
     float largest = 0.0f;
     for (const auto& [model, volume] : volumes_of_models)
       largest = std::max(largest, output::largest_density(output::load_model(model)));
-    options.largest_density = largest;
+    part.largest_density = largest;
   }
   for (const auto& [model, volume] : volumes_of_models) {
-    output::write_volume(output::load_model(model), options, volume);
+    output::write_volume(output::load_model(model), options, volume, part);
     options.zarr = false;  // of the volume of all data alone
   }
 }
 
-void write_linear_volumes(const tilt_series::TiltSeries& series, const Run& run) {
+void write_linear_volumes(const Run& run) {
   for (const Half half : tilt_series::kBothHalves)
-    baseline::write_linear_volume(half_measurement(series, half, run), run.options.resolved,
+    baseline::write_linear_volume(half_measurement(half, run), run.options,
                                   paths_of(run, half).linear_volume);
 }
 
 // Writes the volumes and the maps, and measures how they agree.
-Agreement write_maps(const tilt_series::TiltSeries& series, const Run& run,
-                     const io::OutputSet& outputs) {
+Agreement write_maps(const Run& run, const io::OutputSet& outputs) {
   write_volumes(run);
   const std::filesystem::path even = outputs.location_of(paths_of(run, Half::kEven).volume);
   const std::filesystem::path odd = outputs.location_of(paths_of(run, Half::kOdd).volume);
@@ -86,8 +87,8 @@ Agreement write_maps(const tilt_series::TiltSeries& series, const Run& run,
                   .linear_fsc = {},
                   .local = evaluate::local_resolution(even, odd, tilts)};
   evaluate::write_local_resolution(found.local, even, run.paths.local_resolution);
-  if (run.options.resolved.denoising_halves) {
-    write_linear_volumes(series, run);
+  if (run.options.fit.denoising_halves) {
+    write_linear_volumes(run);
     found.linear_fsc = evaluate::correlate_blocks(
         outputs.location_of(paths_of(run, Half::kEven).linear_volume),
         outputs.location_of(paths_of(run, Half::kOdd).linear_volume), tilts);
@@ -121,7 +122,7 @@ json halves_json(const Run& run, const FinishedFits& fits, const Agreement& foun
   const output::OutputPaths::OfHalf &even = paths_of(run, Half::kEven),
                                     &odd = paths_of(run, Half::kOdd);
   const double voxel_A = run.measurement.pixel_size_A;
-  json all = {{"of", run.options.resolved.split_tilts ? "tilts" : "frames"},
+  json all = {{"of", run.options.fit.split_tilts ? "tilts" : "frames"},
               {"fsc", fsc_json(found.fsc, even.volume, odd.volume)},
               {"local_resolution",
                {{"file", text(run.paths.local_resolution)},
@@ -159,7 +160,7 @@ void log_halves(const Run& run, const evaluate::Fsc& fsc) {
   base::log_warning(fmt::format(
       "'{}' and '{}' are regularised: do not train cryoCARE, IsoNet or DeepDeWedge with them; {}",
       even.volume.string(), odd.volume.string(),
-      run.options.resolved.denoising_halves
+      run.options.fit.denoising_halves
           ? fmt::format("take '{}' and '{}'", even.linear_volume.string(),
                         odd.linear_volume.string())
           : "--denoising-halves writes linear halves for that"));
@@ -179,17 +180,17 @@ void log_halves(const Run& run, const evaluate::Fsc& fsc) {
   }
 }
 
-void write_all(const tilt_series::TiltSeries& series, const Run& run, const FinishedFits& fits,
-               const std::optional<tune::TunedFit>& tuned, Results& results) {
+void write_all(const Run& run, const FinishedFits& fits, const std::optional<tune::TunedFit>& tuned,
+               RunResult& results) {
   io::OutputSet outputs;
-  const Agreement found = write_maps(series, run, outputs);
+  const Agreement found = write_maps(run, outputs);
   write_fsc_plot(found, run.paths.fsc_picture);
   if (tuned) report::write_choice_plot(*tuned, run.paths.choice_picture);
   if (fits.held_out_view)
     report::write_held_out_picture(*fits.held_out_view, run.paths.held_out_picture);
   results.metrics["halves"] = halves_json(run, fits, found);
   io::write_json(run.paths.json, results.metrics);
-  if (run.hooks.write_more) run.hooks.write_more(results, outputs.location_of(run.paths.volume));
+  write_pages(run, outputs, results);
   remove_stale_files(run.options, outputs);
   outputs.commit();
   log_halves(run, found.fsc);
@@ -197,21 +198,21 @@ void write_all(const tilt_series::TiltSeries& series, const Run& run, const Fini
 
 }  // namespace
 
-Results write_half_results(const tilt_series::TiltSeries& series, const Run& run,
-                           const FinishedFits& fits, const std::optional<tune::TunedFit>& tuned) {
+RunResult write_half_results(const Run& run, const FinishedFits& fits,
+                             const std::optional<tune::TunedFit>& tuned) {
   verdict::Verdict verdict = fits.whole.verdict;
   verdict.seconds = fits.halves.back().verdict.seconds;  // of all three fits
   verdict.peak_GiB = fits.halves.back().verdict.peak_GiB;
   json metrics = fits.whole.metrics;
   metrics["verdict"] = verdict::verdict_json(verdict);
-  Results results{.model = {},
-                  .metrics = run_json(run.options, std::move(metrics)),
-                  .verdict = std::move(verdict),
-                  .bead_masking = run.measurement.masks.bead_masking};
+  RunResult results{.model = {},
+                    .metrics = run_json(run.options, std::move(metrics)),
+                    .verdict = std::move(verdict),
+                    .bead_masking = run.measurement.masks.bead_masking};
   run.processes.run_collectively([&] {
     if (!run.processes.is_root()) return;
     try {
-      write_all(series, run, fits, tuned, results);
+      write_all(run, fits, tuned, results);
     } catch (const Error&) {
       say_that_models_are_kept(run);
     }

@@ -12,9 +12,9 @@ namespace tomofield::reconstruction {
 
 /// The fits of all data and of both halves after their last step.
 struct FinishedFits {
-  Findings whole;
+  Examination whole;
   std::optional<measurement::PredictedView> held_out_view;  ///< as the fit of all data predicts it
-  std::array<Findings, 2> halves;                           ///< [tilt_series::Half]
+  std::array<Examination, 2> halves;                        ///< [tilt_series::Half]
 };
 
 /// Writes the results of three finished fits, whose models are in their files: the volume of all
@@ -22,7 +22,7 @@ struct FinishedFits {
 /// resolution, the uncertainty, linear halves if the options ask for them, and the metrics. All of
 /// them appear together (io::OutputSet). If one cannot be written, none appears; the models stay,
 /// and Error is thrown. Every process calls it; the root writes.
-Results write_half_results(const tilt_series::TiltSeries& series, const Run& run,
-                           const FinishedFits& fits, const std::optional<tune::TunedFit>& tuned);
+RunResult write_half_results(const Run& run, const FinishedFits& fits,
+                             const std::optional<tune::TunedFit>& tuned);
 
 }  // namespace tomofield::reconstruction

@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "base/log.h"
+#include "base/trace.h"
 #include "checkpoint/checkpoint.h"
-#include "reconstruct/half_measurement.h"
+#include "fit/domain.h"
+#include "io/saving/scratch_memory.h"
 #include "reconstruct/half_results.h"
 #include "reconstruct/results.h"
 #include "reconstruct/run_fit.h"
@@ -38,7 +40,7 @@ struct Part {
 
 // Holds what a finished fit leaves.
 struct FinishedPart {
-  Findings findings;
+  Examination findings;
   std::vector<measurement::ViewModel> views;
   std::optional<measurement::PredictedView> held_out_view;
   bool took_steps = false;
@@ -58,12 +60,12 @@ base::ProgressSink progress_of(const base::ProgressSink& all, const Part& part) 
 
 // Makes a fit, examines it, and saves its model. Returns nothing if a stop was requested; there is
 // a checkpoint then.
-std::optional<FinishedPart> fit_part(const Run& run, RunRecord record,
-                                     const std::optional<tune::TunedFit>& tuned, const Part& part,
-                                     bool resumes) {
+std::optional<FinishedPart> fit_part(const Run& run, const std::optional<tune::TunedFit>& tuned,
+                                     const Part& part, bool resumes) {
   base::log_info(fmt::format("{}: {} views", part.name, part.measurement.num_fitted_views()));
-  record.origin = {checkpoint::fingerprint_of(run.options, part.measurement, run.processes), tuned};
-  const base::ProgressSink progress = progress_of(run.hooks.progress, part);
+  FitRecord record{
+      {checkpoint::fingerprint_of(run.options, part.measurement, run.processes), tuned}};
+  const base::ProgressSink progress = progress_of(run.observer.fit, part);
   const FitRun made = run_fit(run, {.measurement = part.measurement,
                                     .model = part.model,
                                     .origin = record.origin,
@@ -72,9 +74,9 @@ std::optional<FinishedPart> fit_part(const Run& run, RunRecord record,
                                     .kept_views = part.kept_views,
                                     .may_learn = part.may_learn});
   if (made.was_stopped) return std::nullopt;
-  record.fit_seconds = made.seconds;
+  record.seconds = made.seconds;
   made.fit->free_optimizer();  // the verdict needs the memory
-  FinishedPart finished{.findings = examine(*made.fit, part.measurement, run.options, record),
+  FinishedPart finished{.findings = examine(*made.fit, part.measurement, run, record),
                         .views = made.fit->progress().views,
                         .held_out_view = {},
                         .took_steps = made.took_steps};
@@ -94,12 +96,25 @@ void forget_old_model(const Run& run, Half half) {
 
 }  // namespace
 
-RunResult reconstruct_halves(const tilt_series::TiltSeries& series, const Run& run,
-                             const RunRecord& record, const std::optional<tune::TunedFit>& tuned) {
-  bool resumes = run.options.resolved.resume;
+measurement::Measurement half_measurement(tilt_series::Half half, const Run& run) {
+  const base::TraceSpan span("prepare half");
+  if (run.options.fit.split_tilts) return measurement::half_of_tilts(half, run.measurement);
+  return measurement::half_of_frames(run.series, half, run.measurement,
+                                     io::scratch_directory(run.options.run.output),
+                                     fit::band_rows(run.options.field), run.processes);
+}
+
+std::vector<measurement::ViewModel> views_of_half(const std::vector<measurement::ViewModel>& views,
+                                                  const Run& run) {
+  if (run.options.fit.split_tilts) return views;
+  return measurement::with_noise_of_half_frames(views);
+}
+
+RunResult reconstruct_halves(const Run& run, const std::optional<tune::TunedFit>& tuned) {
+  bool resumes = run.options.run.resume;
   // A half of the tilts has half of the views, and a half of the frames has all of them.
-  const double of_half = run.options.resolved.split_tilts ? 1.0 / 4 : 1.0 / 3;
-  std::optional<FinishedPart> whole = fit_part(run, record, tuned,
+  const double of_half = run.options.fit.split_tilts ? 1.0 / 4 : 1.0 / 3;
+  std::optional<FinishedPart> whole = fit_part(run, tuned,
                                                {.name = "all data",
                                                 .measurement = run.measurement,
                                                 .model = run.paths.model,
@@ -107,7 +122,7 @@ RunResult reconstruct_halves(const tilt_series::TiltSeries& series, const Run& r
                                                 .share = {0.0, 1 - 2 * of_half},
                                                 .may_learn = true},
                                                resumes);
-  if (!whole) return {.outcome = Outcome::kStopped, .results = {}, .checkpoint = run.paths.model};
+  if (!whole) return {.outcome = Outcome::kStopped, .checkpoint = run.paths.model};
   resumes = resumes && !whole->took_steps;
   FinishedFits finished{.whole = std::move(whole->findings),
                         .held_out_view = std::move(whole->held_out_view),
@@ -115,22 +130,21 @@ RunResult reconstruct_halves(const tilt_series::TiltSeries& series, const Run& r
   for (const Half half : tilt_series::kBothHalves) {
     if (!resumes) forget_old_model(run, half);
     const auto at = static_cast<std::size_t>(half);
-    const measurement::Measurement measured = half_measurement(series, half, run);
+    const measurement::Measurement measured = half_measurement(half, run);
     const std::filesystem::path& model = run.paths.halves[at].model;
     std::optional<FinishedPart> made =
-        fit_part(run, record, tuned,
+        fit_part(run, tuned,
                  {.name = fmt::format("{} half", name_of(half)),
                   .measurement = measured,
                   .model = model,
                   .kept_views = views_of_half(whole->views, run),
                   .share = {1 - of_half * static_cast<double>(2 - at), of_half}},
                  resumes);
-    if (!made) return {.outcome = Outcome::kStopped, .results = {}, .checkpoint = model};
+    if (!made) return {.outcome = Outcome::kStopped, .checkpoint = model};
     resumes = resumes && !made->took_steps;
     finished.halves[at] = std::move(made->findings);
   }
-  return {.outcome = Outcome::kFinished,
-          .results = write_half_results(series, run, finished, tuned)};
+  return write_half_results(run, finished, tuned);
 }
 
 }  // namespace tomofield::reconstruction

@@ -25,10 +25,12 @@
 #include "io/json.h"
 #include "io/saving/output_set.h"
 #include "option_table/setting.h"
+#include "options/denoise_factor.h"
 #include "output/metrics.h"
 #include "output/output_paths.h"
 #include "output/volume.h"
 #include "reconstruct/run_files.h"
+#include "reconstruct/run_pages.h"
 #include "report/choice_plot.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
@@ -96,16 +98,16 @@ void write_all(const Writers& writers, const distributed::Communicator& processe
 }
 
 // Writes the results of a fit into files.
-void write_results(Results& results, const ResultFiles& files) {
+void write_results(RunResult& results, const ResultFiles& files) {
   const std::optional<tune::TunedFit>& tuned = files.origin.tuned;
-  const output::OutputPaths paths = output::output_paths(files.options.resolved.output);
+  const output::OutputPaths& paths = files.run.paths;
   const distributed::Communicator& processes = files.share.processes;
   Writers writers;
   if (processes.size() == 1) {
     writers.push_back([&] { output::save_model(paths.model, *results.model, &files.state); });
   }
   writers.push_back([&] {
-    output::write_volume(*results.model, files.options.volume, paths.volume, files.share);
+    output::write_volume(*results.model, files.run.options.volume, paths.volume, files.share);
   });
   if (files.held_out_view) {
     writers.push_back([&] {
@@ -174,7 +176,7 @@ void write_results(Results& results, const ResultFiles& files) {
 }
 
 // Replaces the model of the results by a compact one.
-void make_compact(const compact::Budget& budget, Results& results) {
+void make_compact(const compact::Budget& budget, RunResult& results) {
   const base::Stopwatch running;
   const output::Model& model = *results.model;
   compact::CompactField made = compact::compress(
@@ -187,10 +189,10 @@ void make_compact(const compact::Budget& budget, Results& results) {
 
 // Does the same. If that fails, keeps the finished fit.
 void make_compact_or_keep(const ResultFiles& files, std::optional<io::OutputSet>& outputs,
-                          Results& results) {
-  const std::filesystem::path model = output::output_paths(files.options.resolved.output).model;
+                          RunResult& results) {
+  const std::filesystem::path& model = files.run.paths.model;
   try {
-    make_compact(compact::parse_budget(files.options.resolved.budget), results);
+    make_compact(compact::parse_budget(files.run.options.field.budget), results);
   } catch (const Error&) {
     if (!outputs) throw;
     keep_model(model, *outputs, [&] { output::save_model(model, *results.model, &files.state); });
@@ -199,79 +201,75 @@ void make_compact_or_keep(const ResultFiles& files, std::optional<io::OutputSet>
 
 }  // namespace
 
-Findings examine(const fit::Fit& fit, const measurement::Measurement& series,
-                 const options::ReconstructOptions& options, const RunRecord& record) {
-  Findings found;
-  found.metrics = output::metrics_json(fit, series, record.fit_seconds);
-  found.metrics["tv_weight"] = options.fit.density_variation;
-  if (options.fit.hold_out > 0) {
+Examination examine(const fit::Fit& fit, const measurement::Measurement& measured, const Run& run,
+                    const FitRecord& record) {
+  Examination found;
+  found.metrics = output::metrics_json(fit, measured, record.seconds);
+  found.metrics["tv_weight"] = *options::with_denoise(run.options.fit).density_variation;
+  if (run.options.fit.hold_out > 0) {
     const base::TraceSpan span("score held-out views");
     found.held_out = fit.held_out_error();
   }
-  found.metrics["held_out"] = held_out_json(fit, series, options, found.held_out);
-  found.metrics["processes"] = output::processes_json(fit, record.fit_seconds);
+  found.metrics["held_out"] = held_out_json(fit, measured, run.options, found.held_out);
+  found.metrics["processes"] = output::processes_json(fit, record.seconds);
+  const std::optional<tune::TunedFit>& tuned = record.origin.tuned;
   found.verdict = verdict::judge(
-      {fit, series, options, record.origin.tuned, record.alignment, volume_share(fit, series).rows},
+      {fit, measured, run.options, tuned, run.alignment, volume_share(fit, measured).rows},
       found.held_out);
   found.metrics.update(
       evaluate::artefacts_json(found.verdict.artefacts.speckle, found.verdict.artefacts.faces));
   found.metrics["verdict"] = verdict::verdict_json(found.verdict);
-  const std::optional<tune::TunedFit>& tuned = record.origin.tuned;
-  found.metrics["alignment"] = options.alignment;
+  found.metrics["alignment"] = run.options.alignment;
   found.metrics["tuning"] = tuned ? tune::tuning_json(*tuned) : nlohmann::json(nullptr);
   return found;
 }
 
 std::optional<measurement::PredictedView> central_held_out_view(
-    const fit::Fit& fit, const measurement::Measurement& series, const Findings& found) {
+    const fit::Fit& fit, const measurement::Measurement& measured, const Examination& found) {
   if (!found.held_out) return std::nullopt;
-  return view_near_zero(fit, series, *found.held_out);
+  return view_near_zero(fit, measured, *found.held_out);
 }
 
 nlohmann::json run_json(const options::ReconstructOptions& options, nlohmann::json metrics) {
   return {{"tomofield", TOMOFIELD_VERSION},
           {"options", options::options_json(options)},
-          {"origins", option_table::to_json(options.origins)},
+          {"origins", option_table::settings_json(options.settings)},
           {"metrics", std::move(metrics)}};
 }
 
-Results finish(fit::Fit& fit, const measurement::Measurement& series,
-               const options::ReconstructOptions& options, const RunRecord& record,
-               const WriteMore& write_more) {
+RunResult finish(fit::Fit& fit, const Run& run, const FitRecord& record) {
+  const measurement::Measurement& measured = run.measurement;
   const checkpoint::FitOrigin& origin = record.origin;
-  const bool writes_files = !options.resolved.output.empty();
   fit.free_optimizer();  // the verdict and a compact model need the memory
-  Findings found = examine(fit, series, options, record);
+  Examination found = examine(fit, measured, run, record);
   std::optional<measurement::PredictedView> view;
-  if (writes_files) view = central_held_out_view(fit, series, found);
-  const output::VolumeShare share = volume_share(fit, series);
-  const output::ModelInfo info = checkpoint::model_info(series, options);
-  const output::OutputPaths paths = output::output_paths(options.resolved.output);
-  const distributed::Communicator& processes = share.processes;
+  if (run.writes_files()) view = central_held_out_view(fit, measured, found);
+  const output::VolumeShare share = volume_share(fit, measured);
+  const output::ModelInfo info = checkpoint::model_info(measured, run.options);
   const output::TrainingState state = checkpoint::progress_state(fit, origin);
   std::optional<io::OutputSet> outputs;
-  if (writes_files) outputs.emplace();
-  if (writes_files && processes.size() > 1) checkpoint::save_fit(paths.model, fit, info, state);
-  Results results{.model = output::Model{info, fit.take_field(), std::nullopt},
-                  .metrics = run_json(options, std::move(found.metrics)),
-                  .verdict = std::move(found.verdict),
-                  .bead_masking = series.masks.bead_masking};
-  if (!options.resolved.budget.empty())
-    make_compact_or_keep({options, origin, state, share, view, write_more}, outputs, results);
-  if (writes_files)
-    write_together({options, origin, state, share, view, write_more}, *outputs, results);
-  return results;
+  if (run.writes_files()) outputs.emplace();
+  if (run.writes_files() && run.processes.size() > 1)
+    checkpoint::save_fit(run.paths.model, fit, info, state);
+  RunResult result{.model = output::Model{info, fit.take_field(), std::nullopt},
+                   .metrics = run_json(run.options, std::move(found.metrics)),
+                   .verdict = std::move(found.verdict),
+                   .bead_masking = measured.masks.bead_masking};
+  const ResultFiles files{run, origin, state, share, view};
+  if (!run.options.field.budget.empty()) make_compact_or_keep(files, outputs, result);
+  if (run.writes_files()) write_together(files, *outputs, result);
+  return result;
 }
 
-void write_together(const ResultFiles& files, io::OutputSet& outputs, Results& results) {
+void write_together(const ResultFiles& files, io::OutputSet& outputs, RunResult& results) {
   const distributed::Communicator& processes = files.share.processes;
-  const output::OutputPaths paths = output::output_paths(files.options.resolved.output);
+  const output::OutputPaths& paths = files.run.paths;
   try {
     write_results(results, files);
     processes.run_collectively([&] {
       if (!processes.is_root()) return;
-      if (files.write_more) files.write_more(results, outputs.location_of(paths.volume));
-      remove_stale_files(files.options, outputs);
+      write_pages(files.run, outputs, results);
+      remove_stale_files(files.run.options, outputs);
       outputs.commit();
     });
   } catch (...) {

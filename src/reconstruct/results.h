@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <vector>
 
 #include "checkpoint/checkpoint.h"
 #include "fit/fit.h"
@@ -16,54 +17,62 @@
 
 namespace tomofield::reconstruction {
 
-/// What a finished fit tells of itself.
-struct Findings {
+/// The end of a run. A run that writes files can be resumed after a stop.
+enum class Outcome {
+  kFinished,
+  kStopped,          ///< during the fit; the checkpoint is saved
+  kStoppedTuning,    ///< during the trials; those of --tune that are finished are stored
+  kStoppedAligning,  ///< during the alignment, of which nothing is kept
+};
+
+/// What a run comes to. Only a finished one has more than its outcome.
+struct RunResult {
+  Outcome outcome = Outcome::kFinished;
+  /// The model; each process has the parameters of its own leaves. A run with halves has none: its
+  /// models are in files.
+  std::optional<output::Model> model = {};
+  nlohmann::json metrics = {};  ///< the content of the JSON file beside the volume
+  verdict::Verdict verdict = {};
+  tilt_series::BeadMasking bead_masking = tilt_series::BeadMasking::kNone;
+  std::vector<std::filesystem::path> pictures = {};  ///< that were drawn
+  std::filesystem::path checkpoint = {};             ///< of a run that was stopped during the fit
+};
+
+/// What an examination of a finished fit finds.
+struct Examination {
   nlohmann::json metrics;
   verdict::Verdict verdict;
   std::optional<measurement::ViewErrors> held_out;
 };
 
-/// Measures what a finished fit tells. Every process calls it.
-Findings examine(const fit::Fit& fit, const measurement::Measurement& series,
-                 const options::ReconstructOptions& options, const RunRecord& record);
-
-/// The results of a run.
-struct Results {
-  /// The model; each process has the parameters of its own leaves. A run with halves has none: its
-  /// models are in files.
-  std::optional<output::Model> model;
-  nlohmann::json metrics;  ///< the content of the JSON file beside the volume
-  verdict::Verdict verdict;
-  tilt_series::BeadMasking bead_masking = tilt_series::BeadMasking::kNone;
-};
+/// Examines a finished fit to `measured`. Every process calls it.
+Examination examine(const fit::Fit& fit, const measurement::Measurement& measured, const Run& run,
+                    const FitRecord& record);
 
 /// Predicts the held-out view nearest to zero tilt, if views are held out.
 std::optional<measurement::PredictedView> central_held_out_view(
-    const fit::Fit& fit, const measurement::Measurement& series, const Findings& found);
+    const fit::Fit& fit, const measurement::Measurement& measured, const Examination& found);
 
 /// Returns the content of the JSON file of a run.
 nlohmann::json run_json(const options::ReconstructOptions& options, nlohmann::json metrics);
 
-/// What the files of a run are written from, beside its results.
+/// What the files of a fit are written from, beside the result.
 struct ResultFiles {
-  const options::ReconstructOptions& options;
+  const Run& run;
   const checkpoint::FitOrigin& origin;
   const output::TrainingState& state;  ///< of the fit, for a model that can be continued
   const output::VolumeShare& share;
   const std::optional<measurement::PredictedView>& held_out_view;
-  const WriteMore& write_more;
 };
 
-/// Writes the volume, the model, the metrics and pictures of a run; then the root calls
-/// `write_more`, if there is one. All files appear together. If one cannot be written, the model
-/// alone appears, and Error is thrown. Every process calls it.
-void write_together(const ResultFiles& files, io::OutputSet& outputs, Results& results);
+/// Writes the volume, the model, the metrics, pictures, files for other programs and the report of
+/// a run. All files appear together. If one cannot be written, the model alone appears, and Error
+/// is thrown. Every process calls it.
+void write_together(const ResultFiles& files, io::OutputSet& outputs, RunResult& result);
 
-/// Takes the results out of a finished fit, which loses its field. If options.resolved.output names
-/// the volume, it writes the files (write_together()); the model is the checkpoint of the finished
-/// fit. Every process calls it.
-Results finish(fit::Fit& fit, const measurement::Measurement& series,
-               const options::ReconstructOptions& options, const RunRecord& record,
-               const WriteMore& write_more);
+/// Takes the result out of a finished fit to all views, which loses its field. If the run writes
+/// files, it writes them (write_together()); the model is the checkpoint of the finished fit. Every
+/// process calls it.
+RunResult finish(fit::Fit& fit, const Run& run, const FitRecord& record);
 
 }  // namespace tomofield::reconstruction

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <vector>
 
@@ -11,41 +10,40 @@
 #include "measurement/measurement.h"
 #include "options/run_options.h"
 #include "output/output_paths.h"
+#include "plan/plan.h"
+#include "tilt_series/tilt_series.h"
 
 namespace tomofield::reconstruction {
 
-struct Results;
-
-/// Writes more results of a run, whose volume is in the file `volume`.
-using WriteMore = std::function<void(const Results& results, const std::filesystem::path& volume)>;
-
-/// The callbacks of a run.
-struct ReconstructHooks {
-  base::ProgressSink progress;       ///< receives the progress of the fit
-  base::ProgressSink tune_progress;  ///< receives the progress of the trials before the fit
+/// Receives what a run tells while it goes on. Any of them may be empty.
+struct Observer {
+  /// Is called with the plan that the run follows, once the machine is known to have room for it.
+  std::function<void(const plan::RunPlan& plan)> planned;
+  base::ProgressSink alignment;  ///< receives the progress of the alignment before the fit
+  base::ProgressSink trials;     ///< of the trials before the fit
+  base::ProgressSink fit;        ///< of the fit
   /// Is asked after every step. If it returns true, the run saves a checkpoint and stops.
   std::function<bool()> stop_requested;
-  /// Writes more results, which appear together with the others.
-  WriteMore write_more = {};
 };
 
 /// What the steps of a run share.
 struct Run {
-  const ReconstructHooks& hooks;
+  const Observer& observer;
   const distributed::Communicator& processes;
+  const tilt_series::TiltSeries& series;
   options::ReconstructOptions options;
   output::OutputPaths paths;
-  measurement::Measurement measurement;  ///< of all views
-
-  bool writes_files() const { return !options.resolved.output.empty(); }
-};
-
-/// What a run knows beside its fit.
-struct RunRecord {
-  checkpoint::FitOrigin origin;
   /// Where the pixels of each aligned view come from in the stack.
   std::vector<geometry::RawFromAligned> alignment;
-  double fit_seconds = 0.0;
+  measurement::Measurement measurement;  ///< of all views
+
+  bool writes_files() const { return !options.run.output.empty(); }
+};
+
+/// What is kept of a fit beside its field.
+struct FitRecord {
+  checkpoint::FitOrigin origin;
+  double seconds = 0.0;  ///< of its steps
 };
 
 }  // namespace tomofield::reconstruction

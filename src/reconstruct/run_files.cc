@@ -29,27 +29,25 @@ void add_half_files(const output::OutputPaths& paths, bool with_linear_volumes,
 // Says whether the run resumes. Without a checkpoint there is nothing to resume: then the other
 // files are from another run.
 bool can_resume(const options::ReconstructOptions& options, const output::OutputPaths& paths) {
-  const Options& resolved = options.resolved;
   const auto has = [](const std::filesystem::path& file) { return std::filesystem::exists(file); };
-  return resolved.resume && (has(paths.model) || (resolved.tune && has(paths.trials)) ||
-                             (resolved.align != Alignment::kOff && has(paths.alignment)) ||
-                             (options.may_use_tiles() && has(paths.tiles)));
+  return options.run.resume && (has(paths.model) || (options.fit.tune && has(paths.trials)) ||
+                                (options.run.align != Alignment::kOff && has(paths.alignment)) ||
+                                (options.may_use_tiles() && has(paths.tiles)));
 }
 
 // Returns the files that the run writes, but for the pictures of slices.
 std::vector<std::filesystem::path> result_files(const options::ReconstructOptions& options,
                                                 const output::OutputPaths& paths) {
-  const Options& resolved = options.resolved;
   std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json, paths.report};
   if (options.field.tree == TreeKind::kAdaptive) results.push_back(paths.tree_picture);
   if (options.may_use_tiles()) results.push_back(paths.tiles);
-  if (resolved.tune) results.push_back(paths.trials);
-  if (resolved.align != Alignment::kOff) results.push_back(paths.alignment);
+  if (options.fit.tune) results.push_back(paths.trials);
+  if (options.run.align != Alignment::kOff) results.push_back(paths.alignment);
   if (options.fit.hold_out > 0) results.push_back(paths.held_out_picture);
-  if (options.makes_halves()) add_half_files(paths, resolved.denoising_halves, results);
-  if (resolved.tune || options.open.any()) results.push_back(paths.choice_picture);
+  if (options.makes_halves()) add_half_files(paths, options.fit.denoising_halves, results);
+  if (options.fit.tune || options.open_settings().any()) results.push_back(paths.choice_picture);
   if (options.chooses_weight()) results.push_back(paths.dial_picture);
-  if (options.open.prior) results.push_back(paths.prior_picture);
+  if (options.open_settings().prior) results.push_back(paths.prior_picture);
   for (const auto& file : exchange::exchange_files(options)) results.push_back(file);
   return results;
 }
@@ -63,42 +61,42 @@ std::vector<std::filesystem::path> optional_pictures(const output::OutputPaths& 
 
 void check_options(const options::ReconstructOptions& options) {
   base::require_no_faults(options.faults());
-  if (options.resolved.output.empty()) return;
-  const Options& resolved = options.resolved;
-  io::require_volume_name(resolved.output);
-  const output::OutputPaths paths = output::output_paths(resolved.output);
-  const bool may_replace = resolved.overwrite || can_resume(options, paths);
+  if (options.run.output.empty()) return;
+  io::require_volume_name(options.run.output);
+  const output::OutputPaths paths = output::output_paths(options.run.output);
+  const bool may_replace = options.run.overwrite || can_resume(options, paths);
   const char* const advice =
-      resolved.resume ? "there is no checkpoint to resume, so give --overwrite to start over and "
-                        "replace it, or another name with -o"
-                      : "give --overwrite to replace it, --resume to continue the run that made "
-                        "it, or another name with -o";
+      options.run.resume
+          ? "there is no checkpoint to resume, so give --overwrite to start over and "
+            "replace it, or another name with -o"
+          : "give --overwrite to replace it, --resume to continue the run that made "
+            "it, or another name with -o";
   io::check_result_files(result_files(options, paths), paths.picture_prefix, options.files,
                          may_replace, advice);
-  if (resolved.zarr) output::check_zarr(paths.volume, may_replace, advice);
+  if (options.volume.zarr) output::check_zarr(paths.volume, may_replace, advice);
 }
 
 std::vector<io::OutputLock> claim_outputs(const options::ReconstructOptions& options) {
-  const output::OutputPaths paths = output::output_paths(options.resolved.output);
+  const output::OutputPaths paths = output::output_paths(options.run.output);
   std::vector<std::filesystem::path> files{paths.volume, paths.model, paths.json};
   if (options.makes_halves())
     for (const output::OutputPaths::OfHalf& half : paths.halves) files.push_back(half.model);
   if (options.may_use_tiles()) files.push_back(paths.tiles);
-  if (options.resolved.align != Alignment::kOff) files.push_back(paths.alignment);
-  if (options.resolved.output.empty()) files.clear();
+  if (options.run.align != Alignment::kOff) files.push_back(paths.alignment);
+  if (options.run.output.empty()) files.clear();
   return io::claim_outputs(files, [&] {
     check_options(options);
-    if (options.resolved.resume && std::filesystem::exists(paths.model))
+    if (options.run.resume && std::filesystem::exists(paths.model))
       checkpoint::read_checkpoint([&] { checkpoint::require_state_of_fit(paths.model); });
   });
 }
 
 void remove_stale_files(const options::ReconstructOptions& options, io::OutputSet& results) {
-  if (!options.resolved.overwrite) return;
-  const output::OutputPaths paths = output::output_paths(options.resolved.output);
+  if (!options.run.overwrite) return;
+  const output::OutputPaths paths = output::output_paths(options.run.output);
   std::vector<std::filesystem::path> stale;
   if (!options.chooses_weight()) stale.push_back(paths.dial_picture);
-  if (!options.open.prior) stale.push_back(paths.prior_picture);
+  if (!options.open_settings().prior) stale.push_back(paths.prior_picture);
   for (const std::filesystem::path& picture : optional_pictures(paths))
     if (!results.contains(picture)) stale.push_back(picture);
   std::vector<std::string> removed;

@@ -9,6 +9,7 @@
 #include "base/stopwatch.h"
 #include "base/trace.h"
 #include "checkpoint/checkpoint.h"
+#include "options/denoise_factor.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
@@ -16,9 +17,10 @@ namespace {
 
 std::unique_ptr<fit::Fit> begin_fit(const Run& run, const FitJob& job) {
   const base::TraceSpan span("begin fit");
-  fit::FitOptions options = run.options.fit;
+  FitOptions options = options::with_denoise(run.options.fit);
   if (!job.may_learn) options.prior = Prior::kTv;
-  auto fit = std::make_unique<fit::Fit>(job.measurement, run.options.field, options, run.processes);
+  auto fit = std::make_unique<fit::Fit>(job.measurement, run.options.field, options, run.processes,
+                                        job.part);
   if (!job.kept_views.empty()) fit->keep_views(job.kept_views);
   return fit;
 }
@@ -59,15 +61,15 @@ base::ProgressReport progress_report(const fit::Fit& fit, std::int64_t first_ste
 // if it was stopped; there is a checkpoint then.
 bool run_with_checkpoints(const Run& run, const FitJob& job, fit::Fit& fit) {
   const base::TraceSpan span("fit");
-  const double seconds_between = 60 * run.options.resolved.checkpoint_minutes;
+  const double seconds_between = 60 * run.options.run.checkpoint_minutes;
   const base::Stopwatch running;
   base::Stopwatch since_checkpoint;
   const std::int64_t first_step = fit.progress().step;
   bool stopped = false;
   fit.run([&](const fit::Fit&) {
     if (job.progress) job.progress(progress_report(fit, first_step, running));
-    const ReconstructHooks& hooks = run.hooks;
-    const bool stop = hooks.stop_requested && hooks.stop_requested() && !fit.is_done();
+    const auto& stop_requested = run.observer.stop_requested;
+    const bool stop = stop_requested && stop_requested() && !fit.is_done();
     const bool is_due = run.processes.is_root() && since_checkpoint.seconds() > seconds_between;
     // Any process can stop all of them. The root decides when it is time for a checkpoint.
     const double wanted = run.processes.allreduce_max(stop ? 2.0 : is_due ? 1.0 : 0.0);

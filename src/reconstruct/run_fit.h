@@ -22,6 +22,7 @@ struct FitJob {
   const base::ProgressSink& progress;
   /// Models that the views keep (fit::Fit::keep_views()). Empty: the fit finds its own.
   std::vector<measurement::ViewModel> kept_views = {};
+  fit::FitPart part = {};
   bool may_learn = true;  ///< with the prior that the options say; else with total variation alone
 };
 

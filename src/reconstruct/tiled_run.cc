@@ -18,6 +18,7 @@
 #include "compact/compress.h"
 #include "compact/decoded_field.h"
 #include "fit/fit.h"
+#include "options/denoise_factor.h"
 #include "reconstruct/run_fit.h"
 #include "tomofield/error.h"
 
@@ -35,7 +36,7 @@ struct CoarseStart {
 
 // Holds what is kept of the fit of a tile near the middle, which speaks for all of them.
 struct Example {
-  Findings found;
+  Examination found;
   std::optional<measurement::PredictedView> held_out_view;
   plan::Tile tile;
 };
@@ -57,9 +58,7 @@ base::ProgressSink part_of(const base::ProgressSink& whole, double done, double 
 
 // Fits the coarse stages of the whole region. Returns nothing if the run was stopped.
 std::optional<CoarseStart> fit_coarse_stages(const Run& run, const plan::TilePlan& plan,
-                                             const RunRecord& record) {
-  Run coarse = run;
-  coarse.options.fit.num_stages = plan.num_whole_stages;
+                                             const FitRecord& record) {
   const auto stages = fit::make_stages(run.options.field, run.options.fit);
   double work = 0, of_coarse = 0;
   for (const fit::Stage& stage : stages) {
@@ -67,13 +66,14 @@ std::optional<CoarseStart> fit_coarse_stages(const Run& run, const plan::TilePla
     if (&stage - stages.data() < plan.num_whole_stages) of_coarse += stage.epochs * stage.step_cost;
   }
   const base::ProgressSink progress =
-      part_of(run.hooks.progress, 0.0, of_coarse / work, "whole region");
+      part_of(run.observer.fit, 0.0, of_coarse / work, "whole region");
   const FitJob job{.measurement = run.measurement,
                    .model = run.paths.model,
                    .origin = record.origin,
-                   .resumes = run.options.resolved.resume,
-                   .progress = progress};
-  const FitRun made = run_fit(coarse, job);
+                   .resumes = run.options.run.resume,
+                   .progress = progress,
+                   .part = {.num_stages = plan.num_whole_stages}};
+  const FitRun made = run_fit(run, job);
   if (made.was_stopped) return std::nullopt;
   if (made.took_steps && run.writes_files())
     checkpoint::save_checkpoint(run.paths.model, *made.fit,
@@ -90,7 +90,7 @@ std::optional<CoarseStart> fit_coarse_stages(const Run& run, const plan::TilePla
 // Fits one tile after the other.
 class TileFits {
  public:
-  TileFits(const Run& run, const RunRecord& record, const CoarseStart& start, int num_rows,
+  TileFits(const Run& run, const FitRecord& record, const CoarseStart& start, int num_rows,
            checkpoint::FinishedTiles& finished)
       : run_(run), record_(record), start_(start), num_rows_(num_rows), finished_(finished) {
     fit_options_.fit_view_scale = false;  // the coarse stages have found scales for all tiles
@@ -116,7 +116,7 @@ class TileFits {
     if (!rays.held_out.empty())
       tile_json["held_out_error"] = fit->held_out_error(run_.options.fit.fit_view_scale).total;
     if (example != nullptr) {
-      Findings found = examine(*fit, rays, run_.options, record_);
+      Examination found = examine(*fit, rays, run_, record_);
       auto view = central_held_out_view(*fit, rays, found);
       example->emplace(Example{std::move(found), std::move(view), tile});
     }
@@ -132,7 +132,7 @@ class TileFits {
     const double of_tiles = 1 - start_.part_of_work;
     const auto rows = static_cast<double>(num_rows_);
     const base::ProgressSink progress =
-        part_of(run_.hooks.progress, start_.part_of_work + of_tiles * tile.own.begin / rows,
+        part_of(run_.observer.fit, start_.part_of_work + of_tiles * tile.own.begin / rows,
                 of_tiles * tile.own.size() / rows,
                 fmt::format("rows {} to {} of {}", tile.own.begin, tile.own.end, num_rows_));
     const base::Stopwatch running;
@@ -146,7 +146,7 @@ class TileFits {
             base::progress_at(done, running.seconds(), fmt::format("loss {:.4f}", loss.back())));
       }
       // A tile that is done is kept: the run stops in the next one.
-      stopped = run_.hooks.stop_requested && run_.hooks.stop_requested() && !fit.is_done();
+      stopped = run_.observer.stop_requested && run_.observer.stop_requested() && !fit.is_done();
       return !stopped;
     });
     return !stopped;
@@ -156,7 +156,7 @@ class TileFits {
   checkpoint::TileCodes compressed(const plan::Tile& tile,
                                    std::unique_ptr<field::Field> vertices) const {
     const base::Stopwatch running;
-    compact::Budget budget = compact::parse_budget(run_.options.resolved.budget);
+    compact::Budget budget = compact::parse_budget(run_.options.field.budget);
     if (budget.kind != compact::Budget::Kind::kDecibels)
       budget.amount *= static_cast<double>(tile.own.size()) / num_rows_;
     const auto first = static_cast<int>(run_.measurement.roi.y0);
@@ -173,11 +173,11 @@ class TileFits {
   }
 
   const Run& run_;
-  const RunRecord& record_;
+  const FitRecord& record_;
   const CoarseStart& start_;
   int num_rows_;
   checkpoint::FinishedTiles& finished_;
-  fit::FitOptions fit_options_ = run_.options.fit;
+  FitOptions fit_options_ = options::with_denoise(run_.options.fit);
 };
 
 // Returns the tile that is nearest to the middle of the region.
@@ -207,41 +207,39 @@ nlohmann::json metrics_of(const Run& run, const Example& example,
 }
 
 // Writes the results of a run whose tiles are all finished.
-RunResult finish_tiles(const Run& run, RunRecord& record, checkpoint::FinishedTiles& finished,
+RunResult finish_tiles(const Run& run, FitRecord& record, checkpoint::FinishedTiles& finished,
                        Example example, double seconds_of_coarse) {
-  record.fit_seconds = seconds_of_coarse + finished.sum_of("seconds_fitting");
+  record.seconds = seconds_of_coarse + finished.sum_of("seconds_fitting");
   verdict::Verdict& verdict = example.found.verdict;
   verdict.residual = finished.mean_of("residual");
   verdict.seconds = run.options.since_start.seconds();
   verdict.peak_GiB = static_cast<double>(base::peak_memory()) / (1 << 30);
-  Results results{.model = output::Model{checkpoint::model_info(run.measurement, run.options),
-                                         nullptr, std::nullopt},
-                  .metrics = run_json(
-                      run.options, metrics_of(run, example, finished, verdict, record.fit_seconds)),
-                  .verdict = std::move(verdict),
-                  .bead_masking = run.measurement.masks.bead_masking};
-  results.model->coded = finished.take();
+  RunResult result{
+      .model = output::Model{checkpoint::model_info(run.measurement, run.options), nullptr,
+                             std::nullopt},
+      .metrics = run_json(run.options, metrics_of(run, example, finished, verdict, record.seconds)),
+      .verdict = std::move(verdict),
+      .bead_masking = run.measurement.masks.bead_masking};
+  result.model->coded = finished.take();
   if (!run.writes_files()) {
-    results.model->field = compact::decode_field(*results.model->coded);
-    return {.outcome = Outcome::kFinished, .results = std::move(results)};
+    result.model->field = compact::decode_field(*result.model->coded);
+    return result;
   }
   io::OutputSet outputs;
   const output::TrainingState no_state;
   const output::VolumeShare share{
       run.processes, {0, static_cast<int>(run.measurement.roi.height())}, 0, 0};
-  write_together(
-      {run.options, record.origin, no_state, share, example.held_out_view, run.hooks.write_more},
-      outputs, results);
+  write_together({run, record.origin, no_state, share, example.held_out_view}, outputs, result);
   finished.remove_file();
-  return {.outcome = Outcome::kFinished, .results = std::move(results)};
+  return result;
 }
 
 }  // namespace
 
-RunResult fit_by_tiles(const Run& run, const plan::TilePlan& plan, RunRecord& record) {
+RunResult fit_by_tiles(const Run& run, const plan::TilePlan& plan, FitRecord& record) {
   const base::TraceSpan span("fit by tiles");
   const auto stopped = [&] {
-    return RunResult{.outcome = Outcome::kStopped, .results = {}, .checkpoint = run.paths.model};
+    return RunResult{.outcome = Outcome::kStopped, .checkpoint = run.paths.model};
   };
   checkpoint::FinishedTiles finished(
       run.options, run.measurement, record.origin);  // refuses tiles of another run before any work

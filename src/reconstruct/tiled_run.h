@@ -1,7 +1,7 @@
 #pragma once
 
 #include "plan/tiles.h"
-#include "reconstruct/reconstruct.h"
+#include "reconstruct/results.h"
 #include "reconstruct/run.h"
 
 namespace tomofield::reconstruction {
@@ -14,6 +14,6 @@ namespace tomofield::reconstruction {
 ///
 /// A stopped run goes on with --resume after the coarse stages' last checkpoint, or after the last
 /// tile that was finished.
-RunResult fit_by_tiles(const Run& run, const plan::TilePlan& plan, RunRecord& record);
+RunResult fit_by_tiles(const Run& run, const plan::TilePlan& plan, FitRecord& record);
 
 }  // namespace tomofield::reconstruction

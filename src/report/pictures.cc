@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "base/percentile.h"
+#include "base/threads/parallel.h"
+#include "base/trace.h"
 #include "field/sampling/middle_plane.h"
 #include "io/images/png.h"
 #include "report/canvas.h"
@@ -81,6 +83,23 @@ std::uint8_t grey_of(double value, double black, double range) {
 }
 
 }  // namespace
+
+std::vector<std::filesystem::path> write_run_pictures(const std::filesystem::path& volume,
+                                                      const tilt_series::TiltSeries& series,
+                                                      tilt_series::BeadMasking bead_masking,
+                                                      const std::filesystem::path& prefix) {
+  const base::TraceSpan span("draw pictures");
+  std::vector<std::filesystem::path> pictures;
+  const std::filesystem::path mask = prefix.string() + "_mask.png";
+  base::parallel_for("draw pictures", 2, [&](std::int64_t i) {
+    if (i == 0)
+      pictures = write_slice_pictures(volume, prefix);
+    else
+      write_mask_picture(series, bead_masking, mask);
+  });
+  pictures.push_back(mask);
+  return pictures;
+}
 
 void write_mask_picture(const tilt_series::TiltSeries& series,
                         tilt_series::BeadMasking bead_masking, const std::filesystem::path& path) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -16,14 +15,9 @@ struct ReportedOption {
   bool is_default = false;
 };
 
-/// Returns every option that decides what a run makes, in the order of the help. `record` is the
-/// content of its JSON file, `files` and `requested` are what the user asked for.
-///
-/// The origin is the file that the record's "origins" name for the option ([{"option", "value",
-/// "file", "entry"}]). Otherwise it is "given" if the request differs from the default, "chosen by
-/// trials" or "chosen automatically" if the run chose it, and else "default". Entries of "origins"
-/// that name no option follow.
-std::vector<ReportedOption> reported_options(const nlohmann::json& record, const SeriesFiles& files,
-                                             const Options& requested);
+/// Returns every option that decides what a run makes, in the order of the help. The origin is the
+/// file that Options::settings name for the option, else the one that its Choice has. Settings that
+/// name no option follow.
+std::vector<ReportedOption> reported_options(const SeriesFiles& files, const Options& options);
 
 }  // namespace tomofield::report

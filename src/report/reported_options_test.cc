@@ -9,18 +9,15 @@
 namespace tomofield::report {
 namespace {
 
-using nlohmann::json;
-
 SeriesFiles series_files() {
   SeriesFiles files;
   files.stack = "series.mrc";
   return files;
 }
 
-// Returns the record of a run whose options are those of a request.
-json record_of(const Options& requested) {
-  return {{"options", options::options_json(options::run_options(series_files(), requested))},
-          {"metrics", {{"tuning", nullptr}}}};
+// Returns the options of a run that was asked for.
+std::vector<ReportedOption> reported(const Options& requested) {
+  return reported_options(series_files(), options::run_options(series_files(), requested));
 }
 
 ReportedOption option_of(const std::vector<ReportedOption>& options, const std::string& flag) {
@@ -31,10 +28,9 @@ ReportedOption option_of(const std::vector<ReportedOption>& options, const std::
 
 TEST(ReportedOptions, SayWhereEachValueComesFrom) {
   Options requested;
-  requested.thickness = 150;
-  json record = record_of(requested);
-  record["metrics"]["tuning"] = {{"chosen", {}}};
-  const auto options = reported_options(record, series_files(), requested);
+  requested.specimen.thickness = 150;
+  requested.fit.penalty = {Penalty::kSmooth, Origin::kTrial};
+  const auto options = reported(requested);
   EXPECT_EQ(option_of(options, "stack").value, "series.mrc");
   EXPECT_EQ(option_of(options, "stack").origin, "given");
   const ReportedOption thickness = option_of(options, "--thickness");
@@ -42,49 +38,40 @@ TEST(ReportedOptions, SayWhereEachValueComesFrom) {
   EXPECT_EQ(thickness.origin, "given");
   EXPECT_FALSE(thickness.meaning.empty());
   EXPECT_FALSE(thickness.is_default);
-  EXPECT_EQ(option_of(options, "--tv").origin, "chosen by trials");
+  EXPECT_EQ(option_of(options, "--tv-penalty").origin, "chosen by trials");
   EXPECT_EQ(option_of(options, "--epochs").origin, "chosen automatically");
   EXPECT_EQ(option_of(options, "--seed").origin, "default");
   EXPECT_TRUE(option_of(options, "--seed").is_default);
-  record["options"]["tune"] = true;
-  EXPECT_EQ(option_of(reported_options(record, series_files(), requested), "--epochs").origin,
-            "chosen by trials");
+  requested.fit.epochs = 30;  // the usual value
+  EXPECT_EQ(option_of(reported(requested), "--epochs").origin, "given");
 }
 
 TEST(ReportedOptions, ShowSwitchesAsTheyAreTyped) {
   Options requested;
-  requested.with_margin = false;
-  requested.axis_x = 100.5;
-  requested.axis_z = 20.0;
-  const auto options = reported_options(record_of(requested), series_files(), requested);
+  requested.field.with_margin = false;
+  requested.specimen.axis_x = 100.5;
+  requested.specimen.axis_z = 20.0;
+  const auto options = reported(requested);
   EXPECT_EQ(option_of(options, "--no-margin").value, "on");
   EXPECT_EQ(option_of(options, "--no-noise-fit").value, "off");
   EXPECT_TRUE(option_of(options, "--no-noise-fit").is_default);
   EXPECT_EQ(option_of(options, "--center").value, "100.5, 20 unbinned pixels");
   EXPECT_EQ(std::ranges::count(options, "--center", &ReportedOption::flag), 1);
-  EXPECT_EQ(option_of(reported_options(record_of({}), series_files(), {}), "--center").value, "–");
+  EXPECT_EQ(option_of(reported({}), "--center").value, "–");
 }
 
 TEST(ReportedOptions, NameTheFileAndItsEntry) {
   Options requested;
-  requested.thickness = 150;
-  json record = record_of(requested);
-  record["origins"] = json::array(
-      {{{"option", "--thickness"}, {"value", "150"}, {"file", "tilt.com"}, {"entry", "THICKNESS"}},
-       {{"option", "contrast"}, {"value", "dark"}, {"file", "series.mdoc"}},
-       {{"option", "OFFSET"}, {"value", 1.5}, {"file", "tilt.com"}, {"entry", "OFFSET"}}});
-  for (const bool is_metric : {false, true}) {
-    if (is_metric) {
-      record["metrics"]["origins"] = record["origins"];
-      record.erase("origins");
-    }
-    const auto options = reported_options(record, series_files(), requested);
-    EXPECT_EQ(option_of(options, "--thickness").origin, "tilt.com: THICKNESS");
-    EXPECT_EQ(option_of(options, "--contrast").origin, "series.mdoc");
-    EXPECT_FALSE(option_of(options, "--contrast").is_default);
-    EXPECT_EQ(options.back().flag, "OFFSET");
-    EXPECT_EQ(options.back().value, "1.5");
-  }
+  requested.specimen.thickness = 150;
+  requested.settings = {{"--thickness", "150", "tilt.com", "THICKNESS"},
+                        {"--contrast", "dark", "series.mdoc", ""},
+                        {"--other", "1.5", "tilt.com", "OFFSET"}};
+  const auto options = reported(requested);
+  EXPECT_EQ(option_of(options, "--thickness").origin, "tilt.com: THICKNESS");
+  EXPECT_EQ(option_of(options, "--contrast").origin, "series.mdoc");
+  EXPECT_FALSE(option_of(options, "--contrast").is_default);
+  EXPECT_EQ(options.back().flag, "--other");
+  EXPECT_EQ(options.back().value, "1.5");
 }
 
 }  // namespace

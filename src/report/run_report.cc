@@ -232,8 +232,7 @@ void add_input(const ReportSource& source, HtmlPage& page) {
         "tomogram. What was corrected in the stack before stays corrected.");
   using Rows = std::vector<std::vector<HtmlCell>>;
   Rows chosen{{{"option", ""}, {"value", ""}, {"from", ""}, {"meaning", ""}}}, defaults = chosen;
-  for (const ReportedOption& option :
-       reported_options(source.record, source.files, source.requested))
+  for (const ReportedOption& option : reported_options(source.files, source.options))
     (option.is_default ? defaults : chosen).push_back(option_cells(option));
   page.add_table(chosen, TableOf::kWords);
   page.begin_folded(fmt::format("{} options have their defaults", defaults.size() - 1));
@@ -262,15 +261,15 @@ void add_pictures(const ReportSource& source, const AllFits& fits, HtmlPage& pag
   const json& metrics = fits.front().metrics;
   page.add_heading("Masks");
   page.add_paragraph(mask_text(metrics.at("mask")));
-  page.add_figures({{source.mask_picture, "The view of lowest tilt"}}, FigureSize::kLarge);
+  page.add_figures({{source.pictures.mask, "The view of lowest tilt"}}, FigureSize::kLarge);
   if (const std::string plot = masked_plot(fits); !plot.empty()) page.add_svg(plot);
-  if (!source.tree_picture) return;
+  if (!source.pictures.tree) return;
   page.add_heading("Tree");
   page.add_paragraph(
       "Leaves of the adaptive tree over the central XY plane. They are small where the density "
       "varies much.");
   page.add_figures(
-      {{*source.tree_picture, fmt::format("{} leaves", metrics.at("leaves").get<int>())}},
+      {{*source.pictures.tree, fmt::format("{} leaves", metrics.at("leaves").get<int>())}},
       FigureSize::kLarge);
 }
 
@@ -299,8 +298,8 @@ void add_alignment(const json& metrics, HtmlPage& page) {
 }
 
 // Says why no section shows what another place of the dial would do.
-const char* why_no_dial(const Options& requested) {
-  if (requested.penalty || requested.density_variation)
+const char* why_no_dial(const FitOptions& fit) {
+  if (!fit.penalty.is_left_to_trials())
     return "No sections show what --denoise would do: the weight of total variation was given to "
            "this run (by --tv, --tv-penalty, or a batch that chose once for all its series), so it "
            "tried no others.";
@@ -311,14 +310,14 @@ const char* why_no_dial(const Options& requested) {
 // Shows what another place of the dial would do.
 void add_dial(const ReportSource& source, HtmlPage& page) {
   page.add_heading("Lighter or stronger denoising");
-  if (!source.dial_picture) return page.add_paragraph(why_no_dial(source.requested));
+  if (!source.pictures.dial) return page.add_paragraph(why_no_dial(source.options.fit));
   page.add_paragraph(fmt::format(
       "The same section from three short fits. This run was made with --denoise {}. Where the "
       "strong one loses what you want to see, give --denoise light; where the medium one is too "
       "grainy, give --denoise strong, or any factor such as 1.5. The whole fit is a little "
       "smoother than these.",
       source.record.at("options").at("fit").at("denoise").get<std::string>()));
-  page.add_figures({{*source.dial_picture,
+  page.add_figures({{*source.pictures.dial,
                      "The trials whose weights are nearest to half of the chosen one, to the "
                      "chosen one, and to twice it. --denoise takes the factors"}},
                    FigureSize::kLarge);
@@ -326,7 +325,7 @@ void add_dial(const ReportSource& source, HtmlPage& page) {
 
 // Shows what the learned prior changes, if trials have compared it.
 void add_prior_picture(const ReportSource& source, HtmlPage& page) {
-  if (!source.prior_picture) return;
+  if (!source.pictures.prior) return;
   const bool is_used = source.record.at("options").at("fit").at("prior") == "learned";
   page.add_heading("The learned prior");
   page.add_paragraph(fmt::format(
@@ -336,9 +335,9 @@ void add_prior_picture(const ReportSource& source, HtmlPage& page) {
             "fit. "
             "Look whether you trust what it adds; --prior tv does without"
           : "With the prior the views left out were predicted worse, so this fit does without"));
-  page.add_figures(
-      {{*source.prior_picture, "Without the prior, with it, and the difference in the same greys"}},
-      FigureSize::kLarge);
+  page.add_figures({{*source.pictures.prior,
+                     "Without the prior, with it, and the difference in the same greys"}},
+                   FigureSize::kLarge);
 }
 
 void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
@@ -361,11 +360,11 @@ void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
            "A view far above its neighbours is damaged, badly aligned or has another tilt than its "
            "file says: look at it, and leave it out with --exclude if it is.",
            residual_plot(fits), page);
-  if (source.held_out_picture) {
+  if (source.pictures.held_out) {
     page.add_paragraph(
         "A view that was held out: measured, predicted by the tomogram, and the difference, which "
         "should look like noise.");
-    page.add_figures({{*source.held_out_picture, "Measured, predicted, measured − predicted"}},
+    page.add_figures({{*source.pictures.held_out, "Measured, predicted, measured − predicted"}},
                      FigureSize::kLarge);
   }
 }

@@ -9,14 +9,19 @@
 
 namespace tomofield::report {
 
+/// The pictures that a report shows (PNG).
+struct ReportPictures {
+  std::filesystem::path mask;
+  std::optional<std::filesystem::path> tree, held_out, dial, prior;
+};
+
 /// What the report of a run is made from. Files may still have temporary names.
 struct ReportSource {
   const nlohmann::json& record;  ///< the content of the JSON file beside the volume
   const SeriesFiles& files;      ///< of the series
-  const Options& requested;      ///< as the user gave them
+  const Options& options;        ///< as the run used them
   std::filesystem::path volume;  ///< the file that holds the tomogram (MRC)
-  std::filesystem::path mask_picture;
-  std::optional<std::filesystem::path> tree_picture, held_out_picture, dial_picture, prior_picture;
+  ReportPictures pictures;
 };
 
 /// Returns the report of a finished run: a page in one file that needs no network (docs/report.md).

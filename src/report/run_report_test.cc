@@ -56,27 +56,27 @@ class RunReport : public ::testing::Test {
     writer.close();
     io::write_png_grey(directory_ / "mask.png", 2, 2, std::vector<std::uint8_t>{0, 1, 2, 3});
     files_.stack = "series.mrc";
-    requested_.thickness = 2;
-    record_ = {{"options", options::options_json(options::run_options(files_, requested_))},
+    options_.specimen.thickness = 2;
+    record_ = {{"options", options::options_json(options::run_options(files_, options_))},
                {"metrics", metrics_of_fit(1.25)}};
   }
 
   std::string page() const {
     return run_report({.record = record_,
                        .files = files_,
-                       .requested = requested_,
+                       .options = options_,
                        .volume = directory_ / "volume.mrc",
-                       .mask_picture = directory_ / "mask.png",
-                       .tree_picture = {},
-                       .held_out_picture = {},
-                       .dial_picture = {},
-                       .prior_picture = {}});
+                       .pictures = {.mask = directory_ / "mask.png",
+                                    .tree = {},
+                                    .held_out = {},
+                                    .dial = {},
+                                    .prior = {}}});
   }
   bool page_has(const std::string& text) const { return page().find(text) != std::string::npos; }
 
   const testing::ScratchDirectory directory_;
   SeriesFiles files_;
-  Options requested_;
+  Options options_;
   json record_;
 };
 

@@ -207,7 +207,7 @@ void require_compatible(const TiltSeriesOptions& options) {
         "give one of them",
         options.xf ? "--xf" : "--aln", (options.xf ? *options.xf : *options.aln).string()));
   }
-  if (options.background != 0 && options.contrast == Contrast::kDark)
+  if (options.black_level.value_or(0) != 0 && options.contrast == Contrast::kDark)
     throw Error("--black-level is for --contrast bright: leave it out");
   if (options.log_base != 0 && !options.take_log)
     throw Error("--log-base is for the logarithm: give --log as well, or leave it out");

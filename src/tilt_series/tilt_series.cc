@@ -76,11 +76,12 @@ struct TiltSeries::Impl {
         decoder(*stack, plan, given.contrast, open_mask_of(given, *stack)),
         width(given.resample ? decoder.aligned_width() : decoder.recorded_width()),
         height(given.resample ? decoder.aligned_height() : decoder.recorded_height()),
-        intensity{given.contrast, given.take_log, 0.0, given.background, given.log_base} {
+        intensity{given.contrast, given.take_log, 0.0, given.black_level.value_or(0.0),
+                  given.log_base} {
     for (const PlannedView& planned : plan.views) views.push_back(planned.view);
     beads.discs.resize(views.size());
     beads.undecided.resize(views.size());
-    if (options.halves) halves.emplace(*options.halves, *stack);
+    if (options.even && options.odd) halves.emplace(HalfPaths{*options.even, *options.odd}, *stack);
   }
 
   /// Decodes every view, checks and measures it.
@@ -168,7 +169,7 @@ struct TiltSeries::Impl {
     if (options.contrast == Contrast::kDark)
       intensity.empty_beam = estimate_empty_beam(block_means, processes);
     else
-      background = estimate_background(block_means, processes) - options.background;
+      background = estimate_background(block_means, processes) - options.black_level.value_or(0.0);
     return checks;
   }
 

@@ -25,31 +25,13 @@ struct ViewTransfer;
 
 namespace tomofield::tilt_series {
 
-/// The files of a tilt series, and the reading of its intensities.
-struct TiltSeriesOptions {
-  std::filesystem::path stack;                   ///< MRC or TIFF stack, raw or aligned
-  std::shared_ptr<const io::ImageStack> images;  ///< views in memory, in place of `stack`
-  std::optional<std::filesystem::path> tlt;    ///< .tlt or .rawtlt, one angle in degrees a section
-  std::optional<std::filesystem::path> xf;     ///< IMOD raw → aligned transforms
-  std::optional<std::filesystem::path> xtilt;  ///< IMOD x-axis tilt, degrees a section
-  std::optional<std::filesystem::path> aln;    ///< AreTomo alignment (angles, rotation, shifts)
-  std::optional<std::filesystem::path> mdoc;   ///< SerialEM metadata (angles, pixel size)
-  double tilt_offset_deg = 0;                  ///< added to all tilt angles
-  double x_axis_tilt_deg = 0;                  ///< subtracted from all x-axis tilts
-  std::optional<double> tilt_axis_deg;  ///< of a raw stack, counter-clockwise from +Y; 0: vertical
+/// The files of a tilt series, how they are read, and what the program adds to that.
+struct TiltSeriesOptions : SeriesFiles, ViewOptions {
+  std::shared_ptr<const io::ImageStack> images = {};  ///< views in memory, in place of `stack`
+  bool resample = true;  ///< false: views stay as they were recorded, with their alignment beside
   /// The views will be aligned from the direction of their tilt axis on, as files state it. Else a
   /// stack whose stated axis is not vertical needs an alignment.
   bool starts_raw = false;
-  std::string ignore;                  ///< entries of files that are not applied
-  std::string exclude;                 ///< 1-based sections left out: "1-3,40"
-  double bin = 1.0;                    ///< reduce views by this factor, >= 1
-  std::optional<double> angpix;        ///< or to this pixel size in Å
-  std::optional<double> pixel_size_A;  ///< overrides the header's pixel size
-  Contrast contrast = Contrast::kDark;
-  bool take_log = false;  ///< −ln(I / I0) instead of I0 − I; dark only
-  double log_base = 0;    ///< is added to intensities before the logarithm
-  double background = 0;  ///< is subtracted from bright intensities, in the stack's units
-  bool resample = true;   ///< false: views stay as they were recorded, with their alignment beside
   /// False: decoded views are given up as soon as they have been checked and measured.
   bool keep_views = true;
   /// False: no view is looked at, so that only what follows from headers and small files is known.
@@ -57,21 +39,11 @@ struct TiltSeriesOptions {
   bool look_at_views = true;
   /// Takes decoded views that do not fit in memory; empty: the system's folder for such files.
   std::filesystem::path scratch_dir = {};
-
-  std::optional<std::filesystem::path> mask;       ///< MRC as the stack: 0 is no measurement
-  std::optional<std::filesystem::path> fiducials;  ///< text of model2point, stack coordinates
-  /// Diameter of the gold beads that are looked for and masked; 0: none are. Without it, the
-  /// diameter is estimated if there clearly are beads. They are masked in dark series, and
-  /// undecided in bright ones.
-  std::optional<double> bead_diameter_nm;
-  /// Finds and removes what stays at one place of the detector in all views.
-  bool remove_fixed_pattern = true;
   /// [section]: changes of the alignment that the files give. Empty: none. Local motion
   /// needs `resample`.
   std::vector<geometry::ViewCorrection> corrections = {};
   /// Sections that are left out beside `exclude`, counted from 0, ascending.
   std::vector<std::int64_t> left_out = {};
-  std::optional<HalfPaths> halves = {};  ///< stacks of the even and the odd frames
 };
 
 /// The use of the pixels of beads that were found.

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "objective/options.h"
+#include "objective/constants.h"
 #include "tune/lowest_loss.h"
 
 namespace tomofield::tune {

@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "objective/options.h"
+#include "tomofield/options.h"
 
 namespace tomofield::tune {
 namespace {

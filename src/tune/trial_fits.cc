@@ -31,8 +31,8 @@ class TrialFits::Running {
 
   void begin(const TrialFits& trials) {
     const base::Stopwatch stopwatch;
-    fit::FieldOptions field = trials.field_;
-    fit::FitOptions options = trials.fit_;
+    FieldOptions field = trials.field_;
+    FitOptions options = trials.fit_;
     field.rank = settings_.rank;
     field.leaf_budget = static_cast<int>(std::ceil(field.leaf_budget * trials.part_));
     options.penalty = settings_.penalty;
@@ -42,10 +42,11 @@ class TrialFits::Running {
     options.prior = settings_.prior;
     options.fit_view_scale = settings_.fits_view_scale;
     options.patience = 0;
-    options.scores_epochs = false;
     scores_with_view_scale_ = trials.scores_with_view_scale_;
     measurement_ = &trials.measurement_for(settings_);
-    fit_ = std::make_unique<fit::Fit>(*measurement_, field, options);
+    fit_ = std::make_unique<fit::Fit>(*measurement_, field, options,
+                                      distributed::Communicator::alone(),
+                                      fit::FitPart{.scores_epochs = false});
     seconds_ += stopwatch.seconds();
   }
 
@@ -106,8 +107,8 @@ class TrialFits::Running {
 };
 
 TrialFits::TrialFits(const measurement::Measurement& measurement, std::int64_t rows,
-                     const fit::FieldOptions& field, const fit::FitOptions& fit,
-                     bool scores_with_view_scale, const TuneHooks& hooks, int num_expected,
+                     const FieldOptions& field, const FitOptions& fit, bool scores_with_view_scale,
+                     const TuneHooks& hooks, int num_expected,
                      const distributed::Communicator& processes)
     : views_(trial_views(measurement.geometry.tilt_deg, measurement.held_out)),
       measurement_(trial_measurement(measurement, views_, rows, processes)),

@@ -22,7 +22,7 @@ class TrialFits {
   /// `scores_with_view_scale`, predicted views are scored with a scale and an offset each, so that
   /// trials with and without scales compare. All references must outlive the object.
   TrialFits(const measurement::Measurement& measurement, std::int64_t rows,
-            const fit::FieldOptions& field, const fit::FitOptions& fit, bool scores_with_view_scale,
+            const FieldOptions& field, const FitOptions& fit, bool scores_with_view_scale,
             const TuneHooks& hooks, int num_expected, const distributed::Communicator& processes);
 
   /// Makes a trial with each of these settings. Takes those that `file` has from it, and adds the
@@ -52,8 +52,8 @@ class TrialFits {
   // By whether beads are masked, and by the part of the background that is subtracted.
   std::map<std::pair<bool, double>, measurement::Measurement> corrected_;
   double part_;  // number of the rows of trials over that of all rows
-  const fit::FieldOptions& field_;
-  const fit::FitOptions& fit_;
+  const FieldOptions& field_;
+  const FitOptions& fit_;
   bool scores_with_view_scale_;
   const TuneHooks& hooks_;
   const distributed::Communicator& processes_;

@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 
-#include "fit/options.h"
 #include "tomofield/options.h"
 #include "tune/trials.h"
 
@@ -19,8 +18,8 @@ struct TrialSettings {
   bool fits_view_scale = false;         ///< FitOptions::fit_view_scale
   double background_part = 0;           ///< that is subtracted (measurement/background.h)
   bool masks_beads = false;             ///< whose search left that open (undecided_beads.h)
-  int spike_rank = fit::FitOptions{}.spike_rank;  ///< FitOptions::spike_rank
-  Prior prior = Prior::kTv;                       ///< FitOptions::prior
+  int spike_rank = FitOptions{}.spike_rank;  ///< FitOptions::spike_rank
+  Prior prior = Prior::kTv;                  ///< FitOptions::prior
   bool operator==(const TrialSettings&) const = default;
 };
 using FitTrial = Trial<TrialSettings>;

@@ -11,7 +11,7 @@
 #include "base/enum_names.h"
 #include "base/log.h"
 #include "measurement/surrogate_views.h"
-#include "objective/options.h"
+#include "objective/constants.h"
 #include "tune/trial_fits.h"
 
 namespace tomofield::tune {
@@ -25,15 +25,15 @@ constexpr double kShortPart = 0.2, kShortCoarsePart = 0.25;
 
 // Returns the options of a short trial with plain vertices. If `fit` is shorter than usual for
 // `field`, the trial is shorter in proportion.
-fit::FitOptions short_trial_options(const fit::FieldOptions& plain, const fit::FieldOptions& field,
-                                    const fit::FitOptions& fit) {
+FitOptions short_trial_options(const FieldOptions& plain, const FieldOptions& field,
+                               const FitOptions& fit) {
   const fit::Schedule usual = fit::usual_schedule(plain, fit);
   const double part =
       std::min(1.0, static_cast<double>(fit.epochs) / fit::usual_schedule(field, fit).epochs);
   const auto epochs = [&](double of_usual) {
     return std::max(1, static_cast<int>(std::lround(part * of_usual)));
   };
-  fit::FitOptions shorter = fit;
+  FitOptions shorter = fit;
   shorter.epochs = epochs(kShortPart * usual.epochs);
   if (fit.coarse_epochs > 0)
     shorter.coarse_epochs = epochs(kShortCoarsePart * usual.coarse_epochs_of(usual.epochs));
@@ -70,7 +70,7 @@ void log_prior(const TunedFit& tuned) {
 // Compares fits with and without the learned prior, if that is open.
 std::optional<TunedFit> with_prior(std::optional<TunedFit> tuned,
                                    const measurement::Measurement& measurement,
-                                   const fit::FieldOptions& field, const fit::FitOptions& fit,
+                                   const FieldOptions& field, const FitOptions& fit,
                                    const OpenSettings& open, TrialFile* file,
                                    const TuneHooks& hooks,
                                    const distributed::Communicator& processes) {
@@ -113,17 +113,16 @@ int expected_trials(const SearchSpace& space) {
   return kUsualWeights + 2 + (space.penalty ? 1 : 0) + (space.rank ? 2 : 0);
 }
 
-TrialShape trial_of_tune(const fit::FieldOptions& field, const fit::FitOptions& fit) {
+TrialShape trial_of_tune(const FieldOptions& field, const FitOptions& fit) {
   return {kTrialRows, field, fit};
 }
 
-TrialShape prior_trial(const fit::FieldOptions& field, const fit::FitOptions& fit) {
+TrialShape prior_trial(const FieldOptions& field, const FitOptions& fit) {
   return {kTrialRows, field, fit};
 }
 
-TrialShape short_trial(const fit::FieldOptions& field, const fit::FitOptions& fit,
-                       std::int64_t reach_px) {
-  fit::FieldOptions plain = field;
+TrialShape short_trial(const FieldOptions& field, const FitOptions& fit, std::int64_t reach_px) {
+  FieldOptions plain = field;
   plain.kind = FieldKind::kGrid;
   return {kShortRows + 2 * std::min(reach_px, kMostRowsBeside), plain,
           short_trial_options(plain, field, fit)};
@@ -157,17 +156,16 @@ TrialSettings search_settings(const TrialSettings& start, const SearchSpace& spa
   return trials.first_as_good(candidates);
 }
 
-std::optional<TunedFit> tune(const measurement::Measurement& measurement,
-                             const fit::FieldOptions& field, const fit::FitOptions& fit,
-                             const OpenSettings& open, TrialFile& file, const TuneHooks& hooks,
-                             const distributed::Communicator& processes) {
+std::optional<TunedFit> tune(const measurement::Measurement& measurement, const FieldOptions& field,
+                             const FitOptions& fit, const OpenSettings& open, TrialFile& file,
+                             const TuneHooks& hooks, const distributed::Communicator& processes) {
   const SearchSpace space{.penalty = open.variation, .rank = field.kind == FieldKind::kVm};
   const TrialShape shape = trial_of_tune(field, fit);
   TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
                  open.view_scale || fit.fit_view_scale, hooks, expected_trials(space), processes);
   // A run without total variation still needs a weight to search from.
   const double first =
-      fit.density_variation > 0 ? fit.density_variation : objective::usual_variation(fit.penalty);
+      fit.density_variation > 0 ? *fit.density_variation : objective::usual_variation(fit.penalty);
   const TrialSettings start = with_safe_corrections({.penalty = fit.penalty,
                                                      .variation = first,
                                                      .rank = field.rank,
@@ -191,9 +189,8 @@ std::optional<TunedFit> tune(const measurement::Measurement& measurement,
 }
 
 std::optional<TunedFit> choose_by_short_trials(const measurement::Measurement& measurement,
-                                               const fit::FieldOptions& field,
-                                               const fit::FitOptions& fit, const OpenSettings& open,
-                                               const TuneHooks& hooks,
+                                               const FieldOptions& field, const FitOptions& fit,
+                                               const OpenSettings& open, const TuneHooks& hooks,
                                                const distributed::Communicator& processes) {
   const TrialShape shape = short_trial(field, fit, measurement::largest_reach_px(measurement));
   TrialFits fits(measurement, shape.rows, shape.field, shape.fit,

@@ -43,20 +43,19 @@ struct TuneHooks {
 /// The size of one trial of a search: a fit of at most `rows` rows with these options.
 struct TrialShape {
   std::int64_t rows = 0;
-  fit::FieldOptions field;
-  fit::FitOptions fit;
+  FieldOptions field;
+  FitOptions fit;
 };
 /// Returns the trials that tune() makes of a run.
-TrialShape trial_of_tune(const fit::FieldOptions& field, const fit::FitOptions& fit);
+TrialShape trial_of_tune(const FieldOptions& field, const FitOptions& fit);
 /// Returns the trials that choose_by_short_trials() makes of a run whose transfers move what is in
 /// a view by up to `reach_px`. Rows so near to the ends of a strip depend on rows outside, so the
 /// strip is higher by that at both ends, up to 8 rows.
-TrialShape short_trial(const fit::FieldOptions& field, const fit::FitOptions& fit,
-                       std::int64_t reach_px = 0);
+TrialShape short_trial(const FieldOptions& field, const FitOptions& fit, std::int64_t reach_px = 0);
 
 /// Returns the trials that say whether the learned prior helps a run: whole fits of some rows with
 /// plain vertices. Shorter ones say nothing of it, since the end of a fit is what it replaces.
-TrialShape prior_trial(const fit::FieldOptions& field, const fit::FitOptions& fit);
+TrialShape prior_trial(const FieldOptions& field, const FitOptions& fit);
 
 /// Returns what trials can choose of `wanted`: there must be a background or undecided beads.
 OpenSettings open_settings(OpenSettings wanted, const measurement::Measurement& measurement);
@@ -68,8 +67,8 @@ OpenSettings open_settings(OpenSettings wanted, const measurement::Measurement& 
 /// and trials that it has are not repeated. Returns nothing if a stop was requested. Throws Error
 /// for too few views. Every process calls it.
 std::optional<TunedFit> tune(
-    const measurement::Measurement& measurement, const fit::FieldOptions& field,
-    const fit::FitOptions& fit, const OpenSettings& open, TrialFile& file, const TuneHooks& hooks,
+    const measurement::Measurement& measurement, const FieldOptions& field, const FitOptions& fit,
+    const OpenSettings& open, TrialFile& file, const TuneHooks& hooks,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
 /// Chooses the open settings by short trials (automatic_choice.h). The trials use plain vertices,
@@ -79,8 +78,8 @@ std::optional<TunedFit> tune(
 /// prior is taken if it predicts better. Returns nothing if a stop was requested. Every process
 /// calls it.
 std::optional<TunedFit> choose_by_short_trials(
-    const measurement::Measurement& measurement, const fit::FieldOptions& field,
-    const fit::FitOptions& fit, const OpenSettings& open, const TuneHooks& hooks,
+    const measurement::Measurement& measurement, const FieldOptions& field, const FitOptions& fit,
+    const OpenSettings& open, const TuneHooks& hooks,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
 }  // namespace tomofield::tune

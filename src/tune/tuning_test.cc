@@ -1,5 +1,7 @@
 #include "tune/tuning.h"
 
+#include "objective/constants.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -147,8 +149,8 @@ class Tuning : public ::testing::Test {
                                         .rays = series_.rays,
                                         .noise_sigma = series_.noise_sigma,
                                         .mean_density = 0.1};
-  fit::FieldOptions field_;
-  fit::FitOptions fit_;
+  FieldOptions field_;
+  FitOptions fit_;
   TuneHooks hooks_;
   int num_steps_ = 0, stop_at_ = -1;
   testing::ScratchDirectory scratch_;

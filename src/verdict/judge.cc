@@ -54,11 +54,11 @@ Verdict judge(const FinishedFit& finished, const std::optional<measurement::View
   verdict.artefacts = evaluate::find_artefacts(fit.field(), series.roi, finished.rows, processes);
   verdict.sections = section_profile(verdict.artefacts.section_deviation);
   if (!series.ray_geometry)
-    verdict.views = compare_views(fit, series, finished.options.specimen.with_margin);
+    verdict.views = compare_views(fit, series, finished.options.field.with_margin);
   if (!series.ray_geometry) verdict.defocus = check_defocus(fit, series);
   verdict.seconds = finished.options.since_start.seconds();
   verdict.peak_GiB = processes.allreduce_max(static_cast<double>(base::peak_memory())) / (1 << 30);
-  verdict.warnings = find_warnings(verdict, {.contrast = finished.options.input.contrast,
+  verdict.warnings = find_warnings(verdict, {.contrast = finished.options.views.contrast,
                                              .alignment = finished.alignment,
                                              .tilt_deg = series.geometry.tilt_deg,
                                              .thickness = series.geometry.thickness,

@@ -53,6 +53,21 @@ cd "$scratch"
 "$scratch/examples/reconstruct_stack" cell/tilt_series.mrc cell/tilt_series.tlt 16 example.mrc ||
   fail "examples/reconstruct_stack failed"
 cmp program.mrc example.mrc || fail "examples/reconstruct_stack gives another tomogram"
+mkdir etomo
+cp cell/tilt_series.mrc etomo/TS_01.st
+cp cell/tilt_series.tlt etomo/TS_01.tlt
+sed 's/.*/1 0 0 1 0 0/' etomo/TS_01.tlt >etomo/TS_01.xf
+printf '%s\n' '$newstack -StandardInput' 'InputFile TS_01.st' 'OutputFile TS_01_ali.mrc' \
+  'TransformFile TS_01.xf' >etomo/newst.com
+printf '%s\n' '$tilt -StandardInput' 'InputProjections TS_01_ali.mrc' 'TILTFILE TS_01.tlt' \
+  'THICKNESS 16' >etomo/tilt.com
+"$program" reconstruct etomo -o by_program.mrc >/dev/null
+"$scratch/examples/reconstruct_project" etomo by_library.mrc ||
+  fail "examples/reconstruct_project failed"
+for file in by_program*.mrc by_program*.png; do
+  cmp "$file" "${file/program/library}" || fail "examples/reconstruct_project differs in $file"
+done
+[ -s by_library_report.html ] || fail "examples/reconstruct_project writes no report"
 "$scratch/examples/query_plane" example.h5 30 plane.pgm | grep -q '^32 x 32 values from ' ||
   fail "examples/query_plane failed"
 [ "$(wc -c <plane.pgm)" -eq $((32 * 32 + 13)) ] || fail "plane.pgm has another size"

@@ -33,7 +33,9 @@ def command_of(room):
 
 
 def header_of(room):
-    return str(next((SRC / room).rglob("*.h")).relative_to(SRC))
+    """Returns a header of a room, or None: a room of public functions has none of its own."""
+    header = next((SRC / room).rglob("*.h"), None)
+    return header and str(header.relative_to(SRC))
 
 
 def preprocess(room, text):
@@ -48,7 +50,7 @@ class BuildRefuses(unittest.TestCase):
     def test_a_room_finds_itself_and_the_rooms_in_its_reach_alone(self):
         for room in ROOMS:
             checks = []
-            for other in ROOMS:
+            for other in filter(header_of, ROOMS):
                 is_found = other == room or other in REACHED[room]
                 checks.append(f'#if {"!" if is_found else ""}__has_include("{header_of(other)}")\n'
                               f"#error {other} is {'hidden' if is_found else 'visible'}\n#endif\n")

@@ -52,14 +52,14 @@ SeriesFiles write_files(const ViewImages& images, const ScratchDirectory& scratc
 
 Options quick_options() {
   Options options;
-  options.contrast = Contrast::kBright;
-  options.thickness = 16;
-  options.leaf_size = 16;
-  options.rank = 4;
-  options.epochs = 3;
-  options.coarse_epochs = 2;
-  options.penalty = Penalty::kConcave;
-  options.fit_view_scale = false;
+  options.views.contrast = Contrast::kBright;
+  options.specimen.thickness = 16;
+  options.field.leaf_size = 16;
+  options.field.rank = 4;
+  options.fit.epochs = 3;
+  options.fit.coarse_epochs = 2;
+  options.fit.penalty = Penalty::kConcave;
+  options.fit.fit_view_scale = false;
   return options;
 }
 
@@ -76,7 +76,7 @@ TEST(PublicReconstruct, ArraysAndFilesGiveTheSameBits) {
   const ScratchDirectory scratch;
   const ViewImages images = spheres();
   Options options = quick_options();
-  options.hold_out = 6;
+  options.fit.hold_out = 6;
   int num_reports = 0;
   double last = 0;
   const Reconstruction in_memory =
@@ -91,14 +91,14 @@ TEST(PublicReconstruct, ArraysAndFilesGiveTheSameBits) {
   EXPECT_EQ(scratch.num_files(), 0u);
 
   const SeriesFiles files = write_files(images, scratch);
-  options.output = scratch / "tomogram.mrc";
+  options.run.output = scratch / "tomogram.mrc";
   const Reconstruction on_disk = reconstruct(TiltSeries::from_files(files), options);
   ASSERT_TRUE(in_memory.is_finished && on_disk.is_finished);
   ASSERT_TRUE(in_memory.tomogram && in_memory.model && on_disk.model);
   EXPECT_FALSE(on_disk.tomogram);
   EXPECT_EQ(in_memory.tomogram->size, (std::array<std::int64_t, 3>{32, 20, 16}));
   EXPECT_EQ(in_memory.tomogram->voxel_size_A, 5.0);
-  const std::vector<float> written = read_volume(options.output);
+  const std::vector<float> written = read_volume(options.run.output);
   EXPECT_EQ(in_memory.tomogram->values, written);
   EXPECT_EQ(in_memory.model->sample(in_memory.model->region()), written);
   EXPECT_EQ(on_disk.model->sample(on_disk.model->region()), written);
@@ -112,7 +112,7 @@ TEST(PublicReconstruct, InvertsTheTomogramAlone) {
   const TiltSeries series = TiltSeries::from_images(spheres());
   Options options = quick_options();
   const Reconstruction usual = reconstruct(series, options);
-  options.invert = true;
+  options.volume.invert = true;
   const Reconstruction inverted = reconstruct(series, options);
   for (std::size_t i = 0; i < usual.tomogram->values.size(); ++i)
     ASSERT_EQ(inverted.tomogram->values[i], -usual.tomogram->values[i]);
@@ -121,7 +121,7 @@ TEST(PublicReconstruct, InvertsTheTomogramAlone) {
 
 TEST(PublicReconstruct, TunesInMemory) {
   Options options = quick_options();
-  options.tune = true;
+  options.fit.tune = true;
   bool has_trials = false;
   const Reconstruction made =
       reconstruct(TiltSeries::from_images(spheres()), options, [&](const Progress& progress) {
@@ -141,11 +141,11 @@ TEST(PublicReconstruct, TheCallbackStopsARunWhichResumes) {
   const Reconstruction stopped = reconstruct(series, options, stop);
   EXPECT_FALSE(stopped.is_finished || stopped.tomogram || stopped.model);
 
-  options.output = scratch / "tomogram.mrc";
+  options.run.output = scratch / "tomogram.mrc";
   EXPECT_FALSE(reconstruct(series, options, stop).is_finished);
   EXPECT_TRUE(std::filesystem::exists(scratch / "tomogram.h5"));
   EXPECT_FALSE(std::filesystem::exists(scratch / "tomogram.mrc"));
-  options.resume = true;
+  options.run.resume = true;
   double first = 0;
   const Reconstruction resumed = reconstruct(series, options, [&](const Progress& progress) {
     if (first == 0) first = progress.fraction_done;
@@ -153,25 +153,25 @@ TEST(PublicReconstruct, TheCallbackStopsARunWhichResumes) {
   });
   EXPECT_TRUE(resumed.is_finished);
   EXPECT_GT(first, 0.5);
-  EXPECT_EQ(read_volume(options.output), whole);
+  EXPECT_EQ(read_volume(options.run.output), whole);
 }
 
 TEST(PublicReconstruct, AStopAtTheEndOfTheFitOfAllDataComesInTheFirstHalf) {
   const ScratchDirectory scratch;
   const TiltSeries series = TiltSeries::from_images(spheres());
   Options options = quick_options();
-  options.split_tilts = true;
+  options.fit.split_tilts = true;
   const auto is_of_all = [](const Progress& progress) {
     return progress.detail.starts_with("all data");
   };
   int reports = 0, seen = 0;
-  options.output = scratch / "whole.mrc";
+  options.run.output = scratch / "whole.mrc";
   reconstruct(series, options, [&](const Progress& progress) {
     reports += is_of_all(progress) ? 1 : 0;
     return true;
   });
   ASSERT_GT(reports, 0);
-  options.output = scratch / "stopped.mrc";
+  options.run.output = scratch / "stopped.mrc";
   const Reconstruction stopped = reconstruct(series, options, [&](const Progress& progress) {
     seen += is_of_all(progress) ? 1 : 0;
     return seen < reports;
@@ -228,25 +228,27 @@ TEST(PublicReconstruct, RunsInAnyThreadWithTheSameBits) {
 
 TEST(PublicReconstruct, ResolvedOptionsGiveTheSameBits) {
   Options options;
-  options.thickness = 16;
-  options.contrast = Contrast::kBright;
-  options.epochs = 4;
+  options.specimen.thickness = 16;
+  options.views.contrast = Contrast::kBright;
+  options.fit.epochs = 4;
   const Options resolved = resolve_options(options);
-  EXPECT_EQ(resolved.epochs, 4);
-  EXPECT_EQ(resolved.leaf_size, 64);
-  EXPECT_EQ(resolved.activation, Activation::kSoftplus);
-  EXPECT_FALSE(resolved.fit_view_scale);  // trials choose it
-  EXPECT_TRUE(resolved.vertex_epochs && resolved.coarse_epochs && resolved.learning_rate);
-  EXPECT_FALSE(resolved.penalty || resolved.density_variation);
+  EXPECT_EQ(resolved.fit.epochs, 4);
+  EXPECT_EQ(resolved.field.leaf_size, 64);
+  EXPECT_EQ(resolved.field.activation, Activation::kSoftplus);
+  EXPECT_TRUE(resolved.fit.fit_view_scale.is_open());  // trials choose it
+  EXPECT_TRUE(resolved.fit.penalty.is_open());
+  EXPECT_TRUE(resolved.fit.density_variation.is_open());
+  EXPECT_EQ(resolved.fit.epochs.origin(), Origin::kGiven);
+  EXPECT_EQ(resolved.fit.learning_rate.origin(), Origin::kDerived);
   const TiltSeries series = TiltSeries::from_images(spheres());
   EXPECT_EQ(reconstruct(series, options).tomogram->values,
             reconstruct(series, resolved).tomogram->values);
-  options.penalty = Penalty::kSmooth;
-  options.contrast = Contrast::kDark;
+  options.fit.penalty = Penalty::kSmooth;
+  options.views.contrast = Contrast::kDark;
   const Options dark = resolve_options(options);
-  EXPECT_EQ(dark.density_variation, 5.0);
-  EXPECT_EQ(dark.activation, Activation::kIdentity);
-  EXPECT_FALSE(dark.fit_view_scale);
+  EXPECT_EQ(dark.fit.density_variation, 5.0);
+  EXPECT_EQ(dark.field.activation, Activation::kIdentity);
+  EXPECT_TRUE(dark.fit.fit_view_scale.is_open());
 }
 
 TEST(PublicReconstruct, RefusesWhatCannotBeUsed) {
@@ -255,13 +257,13 @@ TEST(PublicReconstruct, RefusesWhatCannotBeUsed) {
     return message_of<Error>([&] { reconstruct(series, options); });
   };
   Options options = quick_options();
-  options.thickness = 0;
+  options.specimen.thickness = 0;
   EXPECT_NE(refusal(options).find("thickness"), std::string::npos);
   options = quick_options();
-  options.resume = true;
+  options.run.resume = true;
   EXPECT_NE(refusal(options).find("resume"), std::string::npos);
   options = quick_options();
-  options.output = "/nonexistent/tomogram.mrc";
+  options.run.output = "/nonexistent/tomogram.mrc";
   EXPECT_NE(refusal(options).find("/nonexistent"), std::string::npos);
   SeriesFiles files;
   files.stack = "absent.mrc";

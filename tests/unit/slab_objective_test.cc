@@ -104,7 +104,7 @@ class Problem {
                                                        seed_of_forward_differences()));
     terms.push_back(
         std::make_unique<FactorVariation>(*field_, weights_.factor_variation, weights_.penalty));
-    const ObjectiveOptions options;
+    const FitOptions options;
     const SlabObjective objective({.field = *field_,
                                    .projector = projector_,
                                    .measured = measured_,
@@ -240,16 +240,15 @@ Weights weights_of(double density, double factor, double concavity) {
 }
 
 Problem random_problem(FieldKind kind, const Weights& weights) {
-  fit::FieldOptions options;
+  FieldOptions options;
   options.kind = kind;
   options.leaf_size = 16;  // cells of 32 rows: two bands, with margin cells on both sides
   options.vertex_spacing = 2;
   options.rank = 3;
-  options.margin_rank = 2;
-  options.sharpness = 3;
-  options.initial_scale = kind == FieldKind::kVm ? 0.7 : 1.0;
+  const fit::FieldStart start{.sharpness = 3, .initial_scale = kind == FieldKind::kVm ? 0.7 : 1.0};
   const fit::Domain domain = fit::make_domain(tilted_geometry(), {0, 0, kWidth, kRows}, options);
-  return {fit::make_initial_field(domain, kThickness, 0.5, options, 3), domain.grid, weights};
+  return {fit::make_initial_field(domain, kThickness, 0.5, options, 3, {}, start), domain.grid,
+          weights};
 }
 
 struct Kind {

@@ -32,19 +32,19 @@ TiltSeries two_bands() {
 
 Options tiled_options(const fs::path& output) {
   Options options;
-  options.contrast = Contrast::kBright;
-  options.thickness = 16;
-  options.epochs = 2;
-  options.coarse_epochs = 2;
-  options.penalty = Penalty::kConcave;
-  options.fit_view_scale = false;
-  options.black_level = 0;
-  options.bead_diameter_nm = 0;
-  options.spike_rank = 0;
-  options.with_margin = false;
-  options.budget = "0.1dB";
-  options.tile_rows = 64;
-  options.output = output;
+  options.views.contrast = Contrast::kBright;
+  options.specimen.thickness = 16;
+  options.fit.epochs = 2;
+  options.fit.coarse_epochs = 2;
+  options.fit.penalty = Penalty::kConcave;
+  options.fit.fit_view_scale = false;
+  options.views.black_level = 0;
+  options.views.bead_diameter_nm = 0;
+  options.fit.spike_rank = 0;
+  options.field.with_margin = false;
+  options.field.budget = "0.1dB";
+  options.field.tile_rows = 64;
+  options.run.output = output;
   return options;
 }
 
@@ -89,7 +89,7 @@ TEST(TiledRun, AStopAtTheLastStepOfATileKeepsIt) {
   });
   EXPECT_FALSE(stopped.is_finished);
   EXPECT_TRUE(fs::exists(scratch / "stopped_tiles.h5"));
-  options.resume = true;
+  options.run.resume = true;
   const auto resumed = reconstruct(series, options, [&](const Progress& progress) {
     EXPECT_FALSE(is_of_first_tile(progress));
     return true;
@@ -104,8 +104,8 @@ TEST(TiledRun, ResumesWithTheTilesThatItBeganWith) {
   const TiltSeries series = two_bands();
   Options options = tiled_options(scratch / "volume.mrc");
   stop_in_second_tile(series, options);
-  options.resume = true;
-  options.tile_rows.reset();  // the memory is enough for the whole region
+  options.run.resume = true;
+  options.field.tile_rows = {};  // the memory is enough for the whole region
   const Reconstruction made = reconstruct(series, options);
   EXPECT_EQ(tiles_of(made).size(), 2u);
   EXPECT_FALSE(fs::exists(scratch / "volume_tiles.h5"));
@@ -117,13 +117,13 @@ TEST(TiledRun, ThatStartsAnewForgetsOldTiles) {
   Options options = tiled_options(scratch / "volume.mrc");
   stop_in_second_tile(series, options);
   EXPECT_TRUE(fs::exists(scratch / "volume_tiles.h5"));
-  options.overwrite = true;
-  options.seed = 5;
+  options.run.overwrite = true;
+  options.fit.seed = 5;
   const auto stop_at_once = [](const Progress&) { return false; };
   EXPECT_FALSE(reconstruct(series, options, stop_at_once).is_finished);
   EXPECT_FALSE(fs::exists(scratch / "volume_tiles.h5"));
-  options.overwrite = false;
-  options.resume = true;
+  options.run.overwrite = false;
+  options.run.resume = true;
   EXPECT_TRUE(reconstruct(series, options).is_finished);
 }
 
@@ -132,12 +132,12 @@ TEST(TiledRun, ThatWasStoppedDoesNotKeepAWholeFitFromResuming) {
   const TiltSeries series = two_bands();
   stop_in_second_tile(series, tiled_options(scratch / "other.mrc"));
   Options options = tiled_options(scratch / "volume.mrc");
-  options.seed = 5;
-  options.tile_rows.reset();  // the memory is enough for the whole region
+  options.fit.seed = 5;
+  options.field.tile_rows = {};  // the memory is enough for the whole region
   const auto stop_at_once = [](const Progress&) { return false; };
   EXPECT_FALSE(reconstruct(series, options, stop_at_once).is_finished);
   fs::rename(scratch / "other_tiles.h5", scratch / "volume_tiles.h5");
-  options.resume = true;
+  options.run.resume = true;
   const Reconstruction made = reconstruct(series, options);
   EXPECT_TRUE(made.is_finished);
   EXPECT_TRUE(tiles_of(made).is_null());
@@ -148,8 +148,8 @@ TEST(TiledRun, RefusesTilesOfAnotherRunBeforeAnyWork) {
   const TiltSeries series = two_bands();
   stop_in_second_tile(series, tiled_options(scratch / "other.mrc"));
   Options options = tiled_options(scratch / "volume.mrc");
-  options.seed = 5;
-  options.resume = true;
+  options.fit.seed = 5;
+  options.run.resume = true;
   fs::rename(scratch / "other_tiles.h5", scratch / "volume_tiles.h5");
   int num_reports = 0;
   const std::string message = testing::message_of<Error>(

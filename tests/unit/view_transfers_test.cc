@@ -41,15 +41,15 @@ SeriesFiles files_in(const ScratchDirectory& folder) {
 
 Options options_of_run() {
   Options options;
-  options.contrast = Contrast::kBright;
-  options.thickness = 12;
+  options.views.contrast = Contrast::kBright;
+  options.specimen.thickness = 12;
   return options;
 }
 
 std::vector<ViewTransfer> transfers_of(const SeriesFiles& files, const Options& options) {
   const options::ReconstructOptions run = options::run_options(files, options);
-  return measurement::view_transfers(run.files, run.resolved, run.input,
-                                     tilt_series::TiltSeries(run.input));
+  return measurement::view_transfers(run.input(), run.specimen.hand,
+                                     tilt_series::TiltSeries(run.input()));
 }
 
 void expect_same(const ViewTransfer& a, const ViewTransfer& b) {
@@ -95,14 +95,14 @@ TEST(ViewTransfers, FollowTheOptions) {
   SeriesFiles files = files_in(folder);
   Options options = options_of_run();
   EXPECT_TRUE(transfers_of(files, options).empty());
-  options.dose_per_tilt = 2.0;  // and no order but that of the stack
+  options.views.dose_per_tilt = 2.0;  // and no order but that of the stack
   EXPECT_EQ(transfers_of(files, options).back().exposure, 9.0);
   EXPECT_EQ(transfers_of(files, options).back().optics.amplitude_contrast, 1.0);
-  options.exclude = "1";
-  options.defocus_um = 4.0;
-  options.is_phase_flipped = true;
-  options.voltage_kV = 200.0;
-  options.hand = -1;
+  options.views.exclude = "1";
+  options.views.defocus_um = 4.0;
+  options.views.is_phase_flipped = true;
+  options.views.voltage_kV = 200.0;
+  options.specimen.hand = -1;
   const auto transfers = transfers_of(files, options);
   ASSERT_EQ(transfers.size(), 4u);
   EXPECT_EQ(transfers[0].exposure, 3.0);  // of the second section
@@ -110,13 +110,13 @@ TEST(ViewTransfers, FollowTheOptions) {
   EXPECT_EQ(transfers[0].optics.voltage_kV, 200.0);
   EXPECT_TRUE(transfers[0].is_flipped);
   EXPECT_GT(transfers[0].slope.x_A, 0.0);  // at −20°, mirrored
-  options.defocus_hand = 1;                // mirrored or not
+  options.views.defocus_hand = 1;          // mirrored or not
   EXPECT_LT(transfers_of(files, options)[0].slope.x_A, 0.0);
   EXPECT_EQ(transfers[0].detector, nullptr);
   files.mtf = folder.write("mtf.star",
                            "data_\nloop_\n_rlnResolutionInversePixel #1\n_rlnMtfValue #2\n"
                            "0 1\n0.5 0.25\n");
-  options.bin = 2;
+  options.views.bin = 2;
   const auto binned = transfers_of(files, options);
   EXPECT_NEAR(binned[0].detector->transfer(0.5 / binned[0].pixel_size_A), 0.625, 1e-9);
 }
@@ -138,7 +138,7 @@ TEST(ViewTransfers, AreRefusedWithoutWhatTheyNeed) {
   files.stack = folder / "plain/tilt_series.mrc";
   files.ctf.reset();
   Options options = options_of_run();
-  options.defocus_um = 4.0;
+  options.views.defocus_um = 4.0;
   expect_parts(message_of<Error>([&] { transfers_of(files, options); }),
                {"plain/tilt_series.mrc", "pixel size", "--pixel-size"});
 }
@@ -151,17 +151,17 @@ TEST(ViewTransfers, ContradictionsAreFaults) {
   };
   Options options = options_of_run();
   EXPECT_EQ(num_faults(options, "a.defocus"), 0u);
-  options.defocus_um = 3.0;
+  options.views.defocus_um = 3.0;
   EXPECT_EQ(num_faults(options, "none"), 0u);
   EXPECT_EQ(num_faults(options, "a.defocus"), 1u);
-  options.engine = Engine::kRay;
+  options.fit.engine = Engine::kRay;
   EXPECT_EQ(num_faults(options, nullptr), 1u);
   options = options_of_run();
-  options.is_phase_flipped = true;
+  options.views.is_phase_flipped = true;
   EXPECT_EQ(num_faults(options, nullptr), 1u);
   options = options_of_run();
-  options.dose_per_tilt = 3.0;
-  options.is_dose_weighted = true;
+  options.views.dose_per_tilt = 3.0;
+  options.views.is_dose_weighted = true;
   EXPECT_EQ(num_faults(options, nullptr), 1u);
 }
 

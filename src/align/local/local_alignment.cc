@@ -44,9 +44,7 @@ ViewCorrection with_motion(ViewCorrection correction, const ViewWarp& motion,
                           .local = motion.without(rigid)});
 }
 
-fit::FitOptions local_fit(std::uint64_t seed) {
-  return aligning_fit(kCoarseEpochs, kFineEpochs, seed);
-}
+FitOptions local_fit(std::uint64_t seed) { return aligning_fit(kCoarseEpochs, kFineEpochs, seed); }
 
 double rms_change(const std::vector<ViewCorrection>& from, const std::vector<ViewCorrection>& to) {
   double squares = 0.0;
@@ -133,7 +131,7 @@ class LocalFit {
   const JointProblem& problem_;
   Freedoms freedoms_;
   const distributed::Communicator& processes_;
-  fit::FieldOptions field_;
+  FieldOptions field_;
   measurement::Measurement measurement_;
   fit::Fit fit_;
   std::vector<std::size_t> by_tilt_;  // views in order of tilt

@@ -44,7 +44,7 @@ std::vector<geometry::ViewCorrection> turned(std::vector<geometry::ViewCorrectio
 std::vector<double> wide_residuals(const JointProblem& problem,
                                    const std::vector<geometry::ViewCorrection>& corrections,
                                    const distributed::Communicator& processes) {
-  const fit::FieldOptions field = aligning_field(problem.field);
+  const FieldOptions field = aligning_field(problem.field);
   const measurement::Measurement views =
       aligning_measurement(problem, corrections, kAxisBin, field, processes);
   fit::Fit fit(views, field, axis_fit(problem.seed), processes);
@@ -102,7 +102,7 @@ bool can_refine_axis(const measurement::Measurement& plan) {
   return std::min(plan.geometry.width, plan.rays_shape().num_rows) >= kNarrowest_px;
 }
 
-fit::FitOptions axis_fit(std::uint64_t seed) { return aligning_fit(kAxisEpochs, 1, seed); }
+FitOptions axis_fit(std::uint64_t seed) { return aligning_fit(kAxisEpochs, 1, seed); }
 
 std::vector<geometry::ViewCorrection> with_refined_axis(
     const JointProblem& problem, const std::vector<geometry::ViewCorrection>& start,

@@ -31,7 +31,7 @@ inline constexpr int kAxisEpochs = 16, kAxisFits = 3;
 bool can_refine_axis(const measurement::Measurement& plan);
 
 /// Returns the options of the fits of with_refined_axis().
-fit::FitOptions axis_fit(std::uint64_t seed);
+FitOptions axis_fit(std::uint64_t seed);
 
 /// Returns the corrections of a joint alignment with the common rotation at which fields that are
 /// fitted to the views leave the smallest residual. Pixels near the edges do not count, and neither

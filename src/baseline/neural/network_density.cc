@@ -7,8 +7,8 @@
 
 #include "base/threads/parallel.h"
 #include "fit/domain.h"
-#include "fit/options.h"
 #include "kernels/lanes.h"
+#include "tomofield/options.h"
 
 namespace tomofield::baseline {
 namespace {
@@ -19,7 +19,7 @@ using kernels::kLanes;
 constexpr int kChunk = 128;
 
 // The sharpness β of softplus per density unit, as in the main method.
-constexpr float kSharpness = static_cast<float>(fit::FieldOptions{}.sharpness);
+constexpr float kSharpness = static_cast<float>(fit::FieldStart{}.sharpness);
 
 // The number of parts of a slab whose gradients are summed separately. Their order, not the order
 // of the threads, decides the bits.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "geometry/tilt_geometry.h"
+#include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
 
 namespace tomofield::baseline {
@@ -14,5 +15,8 @@ Options tensorf_defaults();
 /// by `coarse_bin` end with the node; a small region bins fewer pixels. Throws Error if the region
 /// is larger than a node can be.
 int one_node_size(const Rectangle& roi, int coarse_bin);
+
+/// Returns the side of one node for the region of a run.
+int one_node_size(const tilt_series::TiltSeries& series, const Options& options);
 
 }  // namespace tomofield::baseline

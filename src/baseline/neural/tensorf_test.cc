@@ -15,13 +15,12 @@ namespace tomofield::baseline {
 namespace {
 
 int node_size(std::int64_t width, std::int64_t height) {
-  return one_node_size({5, 7, 5 + width, 7 + height}, tensorf_defaults().coarse_bin);
+  return one_node_size({5, 7, 5 + width, 7 + height}, tensorf_defaults().fit.coarse_bin);
 }
 
-fit::FieldOptions field_for(std::int64_t width, std::int64_t height) {
-  fit::FieldOptions field;
-  field.depth = 0;
-  field.rank = tensorf_defaults().rank;
+FieldOptions field_for(std::int64_t width, std::int64_t height) {
+  FieldOptions field;
+  field.rank = tensorf_defaults().field.rank;
   field.with_margin = false;
   field.leaf_size = node_size(width, height);
   return field;
@@ -29,7 +28,7 @@ fit::FieldOptions field_for(std::int64_t width, std::int64_t height) {
 
 TEST(Tensorf, OneNodeCoversTheRegion) {
   for (const std::int64_t width : {20, 100, 128, 500}) {
-    const fit::FieldOptions field = field_for(width, 90);
+    const FieldOptions field = field_for(width, 90);
     const Rectangle roi{5, 7, 5 + width, 97};
     const auto domain =
         fit::make_domain(geometry::centred_geometry(600, 600, 40, {-60, 0, 60}), roi, field);
@@ -37,19 +36,19 @@ TEST(Tensorf, OneNodeCoversTheRegion) {
     EXPECT_GE(domain.tree.leaf(0).square.size, std::max<std::int64_t>(width, 90));
     EXPECT_LT(domain.tree.leaf(0).square.size, std::max<std::int64_t>(width, 90) + 128);
     Options options = tensorf_defaults();
-    options.thickness = 40;
-    options.leaf_size = field.leaf_size;
+    options.specimen.thickness = 40;
+    options.field.leaf_size = field.leaf_size;
     EXPECT_EQ(option_table::range_faults(options), std::vector<std::string>());
   }
 }
 
 TEST(Tensorf, StartsWithVerticesEightTimesAsFarApart) {
   const Options defaults = tensorf_defaults();
-  fit::FitOptions fit;
-  fit.epochs = *defaults.epochs;
-  fit.vertex_epochs = *defaults.vertex_epochs;
-  fit.coarse_epochs = *defaults.coarse_epochs;
-  fit.coarse_bin = defaults.coarse_bin;
+  FitOptions fit;
+  fit.epochs = *defaults.fit.epochs;
+  fit.vertex_epochs = *defaults.fit.vertex_epochs;
+  fit.coarse_epochs = *defaults.fit.coarse_epochs;
+  fit.coarse_bin = defaults.fit.coarse_bin;
   const auto stages = fit::make_stages(field_for(128, 128), fit);
   ASSERT_EQ(stages.size(), 4u);
   EXPECT_EQ(stages.front().bin, 8);

@@ -7,43 +7,34 @@
 #include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
 #include "cli/options/table_options.h"
-#include "cli/terminal/console.h"
-#include "exchange/alignment_output.h"
-#include "io/saving/output_set.h"
+#include "cli/terminal/stop_signal.h"
+#include "option_table/setting.h"
 #include "options/run_options.h"
-#include "plan/plan.h"
-#include "tilt_series/tilt_series.h"
-#include "tomofield/error.h"
+#include "reconstruct/reconstruct.h"
 
 namespace tomofield::cli {
 namespace {
 
 using option_table::Group;
 
-void run(const option_table::Choices& choices, const std::vector<option_table::Setting>& origins) {
-  if (choices.options.align == Alignment::kOff)
-    throw Error("there is nothing to do with --align off: give refine or full");
+void run(option_table::Choices& choices, const std::vector<Setting>& origins) {
+  option_table::note_settings(origins, choices);
   options::ReconstructOptions options = options::run_options(choices.files, choices.options);
-  options.origins = origins;
-  const std::vector<io::OutputLock> locks = exchange::claim_alignment(options);
-  plan::check_alignment_alone(options);
-  io::OutputSet results;  // the record of the alignment joins the other files
-  const tilt_series::TiltSeries series =
-      align_and_open(options, distributed::Communicator::alone());
-  exchange::write_alignment_results(series, options);
-  results.commit();
+  stop_on_signals(false);
+  const auto& alone = distributed::Communicator::alone();
+  if (!reconstruction::align(options, terminal_observer(alone))) throw_stopped_alignment();
   print_alignment(options);
 }
 
 }  // namespace
 
-void add_align_command(CLI::App& program, const std::vector<option_table::Setting>& origins) {
+void add_align_command(CLI::App& program, const std::vector<Setting>& origins) {
   CLI::App& command = *program.add_subcommand(
       "align", "Align the views of a tilt series with each other, without a reconstruction");
   auto choices = std::make_shared<option_table::Choices>();
   add_input_options(command, *choices);
   add_groups(command, *choices, {Group::kSpecimen});
-  choices->options.align = Alignment::kRefine;
+  choices->options.run.align = Alignment::kRefine;
   for (const char* key : {"fit.align", "fit.seed", "running.output", "running.overwrite"})
     add_row(command, key, *choices);
   command.get_option("--output")

@@ -10,7 +10,7 @@
 #include "baseline/run_baseline.h"
 #include "baseline/tune.h"
 #include "cli/commands/commands.h"
-#include "cli/commands/pictures.h"
+#include "cli/commands/run_reconstruction.h"
 #include "cli/commands/tensorf_command.h"
 #include "cli/options/common_options.h"
 #include "cli/options/enum_option.h"
@@ -24,12 +24,13 @@
 #include "distributed/communicator.h"
 #include "io/saving/output_set.h"
 #include "output/shared_options.h"
+#include "report/pictures.h"
 
 namespace tomofield::cli {
 namespace {
 
 using option_table::Group;
-using Origins = std::vector<option_table::Setting>;
+using Origins = std::vector<Setting>;
 
 template <typename Method>
 struct BaselineArguments {
@@ -67,15 +68,15 @@ void run_method(const baseline::BaselineOptions& options, const baseline::Method
   tilt_series::TiltSeriesOptions input = output::series_options(options.files, shared);
   input.keep_views = !dry_run;
   const tilt_series::TiltSeries series(input);
-  print_plan(baseline::plan_baseline(series, options), method, shared.axes);
-  if (shared.tune) print("short trials first, that choose settings by held-out views\n");
+  print_plan(baseline::plan_baseline(series, options), method, shared.volume.axes);
+  if (shared.fit.tune) print("short trials first, that choose settings by held-out views\n");
   flush_output();  // the plan comes before other output, in a file too
   if (dry_run) return;
   io::OutputSet results;
   const baseline::BaselineSummary summary = baseline::run_baseline(
       series, options, {make_progress_bar("tune"), make_progress_bar("baseline")});
-  const auto pictures = write_pictures(results.location_of(paths.volume), series,
-                                       summary.bead_masking, paths.picture_prefix);
+  const auto pictures = report::write_run_pictures(results.location_of(paths.volume), series,
+                                                   summary.bead_masking, paths.picture_prefix);
   results.commit();
   print_summary(summary);
   print("tomogram  {}\nmetrics   {}\n", paths.volume.string(), paths.json.string());
@@ -84,19 +85,21 @@ void run_method(const baseline::BaselineOptions& options, const baseline::Method
 
 template <typename Method>
 void run(BaselineArguments<Method>& arguments, const Origins& origins) {
+  option_table::note_settings(origins, arguments.choices);
   const Options& shared = arguments.choices.options;
   Method& method = arguments.method;
   if constexpr (requires { method.non_negative; })
-    method.non_negative = arguments.non_negative.value_or(shared.contrast != Contrast::kDark);
+    method.non_negative = arguments.non_negative.value_or(shared.views.contrast != Contrast::kDark);
   const baseline::BaselineOptions options{arguments.choices.files, shared, method,
-                                          arguments.ctf_correction, origins};
+                                          arguments.ctf_correction};
   std::vector<io::OutputLock> locks;
   if (arguments.dry_run)
     baseline::check_options(options);
   else
     locks = baseline::claim_outputs(options);
-  const baseline::BaselinePaths paths = baseline::baseline_paths(shared.output);
-  check_trace_file(arguments.trace, {paths.volume, paths.json}, options.files, shared.overwrite);
+  const baseline::BaselinePaths paths = baseline::baseline_paths(shared.run.output);
+  check_trace_file(arguments.trace, {paths.volume, paths.json}, options.files,
+                   shared.run.overwrite);
   run_traced(arguments.dry_run ? std::nullopt : arguments.trace, distributed::Communicator::alone(),
              [&] { run_method(options, method.facts(), paths, arguments.dry_run); });
 }
@@ -107,7 +110,7 @@ void add_fit_options(CLI::App& command, BaselineArguments<Method>& arguments) {
   add_shared_fit_options(command, arguments.choices);
   if constexpr (baseline::Tunable<Method>) {
     command
-        .add_flag("--tune", arguments.choices.options.tune,
+        .add_flag("--tune", arguments.choices.options.fit.tune,
                   "Choose the weight, or what else regularises, by short trials that predict every "
                   "8th view, then reconstruct from all views. No trial sees those of --hold-out")
         ->group("Fit");

@@ -1,12 +1,11 @@
 #include "cli/commands/choice_file.h"
 
+#include "cli/commands/run_reconstruction.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
 #include "cli/terminal/exit_status.h"
-#include "cli/terminal/progress_bar.h"
 #include "cli/terminal/stop_signal.h"
 #include "io/json.h"
-#include "plan/plan.h"
 #include "reconstruct/reconstruct.h"
 
 namespace tomofield::cli {
@@ -20,15 +19,10 @@ void add_choice_option(CLI::App& command, std::optional<std::filesystem::path>& 
       ->group(kHelpAllGroup);
 }
 
-void write_choice(const std::filesystem::path& file, const tilt_series::TiltSeries& series,
-                  const options::ReconstructOptions& options,
+void write_choice(const std::filesystem::path& file, const options::ReconstructOptions& options,
                   const distributed::Communicator& processes) {
-  processes.run_collectively([&] { plan::require_possible_run(series, options, processes); });
   stop_on_signals(processes.size() > 1);
-  reconstruction::ReconstructHooks hooks{
-      .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};
-  if (processes.is_root()) hooks.tune_progress = make_progress_bar("tune");
-  const auto choice = reconstruction::choose_settings_alone(series, options, hooks, processes);
+  const auto choice = reconstruction::choose(options, terminal_observer(processes), processes);
   if (!choice) throw ExitStatus{stop_status(), "stopped during the trials"};
   processes.run_collectively([&] {
     if (processes.is_root()) io::write_json(file, *choice);

@@ -6,7 +6,6 @@
 
 #include "distributed/communicator.h"
 #include "options/run_options.h"
-#include "tilt_series/tilt_series.h"
 
 namespace tomofield::cli {
 
@@ -16,8 +15,7 @@ void add_choice_option(CLI::App& command, std::optional<std::filesystem::path>& 
 /// Makes the trials of a run alone, and writes as JSON what they choose (null if nothing is left to
 /// trials), for programs that give one choice to several runs (batch). Throws ExitStatus if it was
 /// stopped.
-void write_choice(const std::filesystem::path& file, const tilt_series::TiltSeries& series,
-                  const options::ReconstructOptions& options,
+void write_choice(const std::filesystem::path& file, const options::ReconstructOptions& options,
                   const distributed::Communicator& processes);
 
 }  // namespace tomofield::cli

@@ -13,8 +13,8 @@ namespace tomofield::cli {
 // src/cli/NAME_command.cc.
 /// The metrics list `origins`, the settings that come from a project (project_arguments.h). They
 /// may change until the command runs.
-void add_align_command(CLI::App& program, const std::vector<option_table::Setting>& origins);
-void add_baseline_command(CLI::App& program, const std::vector<option_table::Setting>& origins);
+void add_align_command(CLI::App& program, const std::vector<Setting>& origins);
+void add_baseline_command(CLI::App& program, const std::vector<Setting>& origins);
 void add_batch_command(CLI::App& program);
 void add_compare_command(CLI::App& program);
 void add_evaluate_command(CLI::App& program);
@@ -22,7 +22,7 @@ void add_export_command(CLI::App& program);
 void add_info_command(CLI::App& program);
 /// The only one that several processes may share.
 void add_reconstruct_command(CLI::App& program, const distributed::Communicator& processes,
-                             const std::vector<option_table::Setting>& origins);
+                             const std::vector<Setting>& origins);
 void add_simulate_command(CLI::App& program);
 void add_view_command(CLI::App& program);
 

@@ -125,8 +125,8 @@ void reproject(const EvaluateArguments& arguments, Findings& findings) {
   files.stack = *arguments.series;
   const Options& chosen = arguments.choices.options;
   const evaluate::VolumeScoreOptions options{arguments.volume,
-                                             output::series_options(files, chosen),
-                                             output::specimen_options(chosen), arguments.hold_out};
+                                             output::series_options(files, chosen), chosen.specimen,
+                                             chosen.field.with_margin, arguments.hold_out};
   const evaluate::VolumeScore score = evaluate::score_volume(options);
   findings.metrics["reprojection"] = evaluate::volume_score_json(score, options);
   print("reprojection error {:.4f} of the noise's variance in {} views\n", score.errors.total,

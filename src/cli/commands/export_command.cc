@@ -52,7 +52,7 @@ std::vector<io::OutputLock> claim_output(const ExportArguments& arguments) {
     constexpr const char* kAdvice = "give another name, or --overwrite to replace it";
     io::check_output_files({written}, {arguments.model}, arguments.overwrite, kAdvice);
     if (arguments.compact.empty()) io::require_volume_name(arguments.output);
-    if (arguments.compact.empty() && arguments.choices.options.zarr)
+    if (arguments.compact.empty() && arguments.choices.options.volume.zarr)
       output::check_zarr(arguments.output, arguments.overwrite, kAdvice);
   });
 }
@@ -117,10 +117,8 @@ void run_export(ExportArguments& arguments) {
   const auto& angles = arguments.rotation;
   if (!angles.empty())
     box.field_from_box = field::rotation_from_euler(angles[0], angles[1], angles[2]);
-  output::VolumeOptions volume = output::volume_options(arguments.choices.options);
-  volume.box = box;
   io::OutputSet results;
-  output::write_volume(model, volume, arguments.output);
+  output::write_volume(model, arguments.choices.options.volume, arguments.output, {.box = box});
   results.commit();
   print("{}: {} × {} × {} voxels (x, y, z) of {:.6g} Å about {:.6g}, {:.6g}, {:.6g} px\n",
         arguments.output.string(), box.size[0], box.size[1], box.size[2],

@@ -12,6 +12,8 @@
 #include "io/json.h"
 #include "io/saving/output_files.h"
 #include "plan/plan.h"
+#include "reconstruct/run_files.h"
+#include "tilt_series/tilt_series.h"
 
 namespace tomofield::cli {
 namespace {
@@ -32,7 +34,7 @@ std::size_t memory_of_one_thread(const tilt_series::TiltSeries& series,
 // Says whether a run would take a setting that the options leave open from another run. With --tune
 // it looks for its own.
 bool is_left_to_runs(const options::ReconstructOptions& options, bool is_open) {
-  return is_open && !options.resolved.tune;
+  return is_open && !options.fit.tune;
 }
 
 }  // namespace
@@ -50,13 +52,16 @@ void check_answer_file(const std::optional<std::filesystem::path>& file, const c
                        const options::ReconstructOptions& options) {
   if (!file) return;
   io::check_output_files(
-      {*file}, io::input_files(options.files), options.resolved.overwrite,
+      {*file}, io::input_files(options.files), options.run.overwrite,
       fmt::format("give another name with {}, or --overwrite to replace it", flag));
 }
 
-void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries& series,
-                const options::ReconstructOptions& options,
+void write_plan(const std::filesystem::path& file, const options::ReconstructOptions& options,
                 const distributed::Communicator& processes) {
+  processes.run_collectively([&] { reconstruction::check_options(options); });
+  tilt_series::TiltSeriesOptions input = options.input();
+  input.look_at_views = false;
+  const tilt_series::TiltSeries series(input, processes);
   processes.run_collectively([&] {
     const plan::RunPlan plan = plan::plan_run(series, options, processes);
     require_few_vertices(plan);
@@ -67,24 +72,25 @@ void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries
         estimate.core_seconds ? nlohmann::json(*estimate.core_seconds) : nlohmann::json(nullptr);
     const std::string stack =
         std::filesystem::absolute(options.files.stack).lexically_normal().string();
-    io::write_json(file, {{"tomofield", TOMOFIELD_VERSION},
-                          {"stack", base::utf8_text(stack)},
-                          {"views", plan.num_views},
-                          {"view_size_px", {plan.view_width, plan.view_height}},
-                          {"pixel_size_A", plan.pixel_size_A},
-                          {"parameters", plan.num_parameters},
-                          {"trials", plan.num_trials},
-                          {"open_variation", is_left_to_runs(options, options.open.variation)},
-                          {"open_spike_rank", is_left_to_runs(options, options.open.spikes)},
-                          {"open_prior", is_left_to_runs(options, options.open.prior)},
-                          {"steps", plan.num_steps},
-                          {"threads", base::thread_count()},
-                          {"memory_bytes", plan.memory_bytes},
-                          {"memory_bytes_of_one_thread", of_one_thread},
-                          {"core_seconds", seconds},
-                          {"sample_steps", estimate.sample_steps},
-                          {"result_bytes", estimate.result_bytes},
-                          {"disk_bytes", estimate.disk_bytes}});
+    io::write_json(file,
+                   {{"tomofield", TOMOFIELD_VERSION},
+                    {"stack", base::utf8_text(stack)},
+                    {"views", plan.num_views},
+                    {"view_size_px", {plan.view_width, plan.view_height}},
+                    {"pixel_size_A", plan.pixel_size_A},
+                    {"parameters", plan.num_parameters},
+                    {"trials", plan.num_trials},
+                    {"open_variation", is_left_to_runs(options, options.open_settings().variation)},
+                    {"open_spike_rank", is_left_to_runs(options, options.open_settings().spikes)},
+                    {"open_prior", is_left_to_runs(options, options.open_settings().prior)},
+                    {"steps", plan.num_steps},
+                    {"threads", base::thread_count()},
+                    {"memory_bytes", plan.memory_bytes},
+                    {"memory_bytes_of_one_thread", of_one_thread},
+                    {"core_seconds", seconds},
+                    {"sample_steps", estimate.sample_steps},
+                    {"result_bytes", estimate.result_bytes},
+                    {"disk_bytes", estimate.disk_bytes}});
   });
 }
 

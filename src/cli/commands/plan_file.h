@@ -8,7 +8,6 @@
 #include "options/run_options.h"
 #include "plan/plan.h"
 #include "plan/run_estimate.h"
-#include "tilt_series/tilt_series.h"
 
 namespace tomofield::cli {
 
@@ -21,8 +20,7 @@ void check_answer_file(const std::optional<std::filesystem::path>& file, const c
 
 /// Writes what a run needs as JSON, whether this machine has it or not, for programs that start
 /// runs elsewhere or later (batch).
-void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries& series,
-                const options::ReconstructOptions& options,
+void write_plan(const std::filesystem::path& file, const options::ReconstructOptions& options,
                 const distributed::Communicator& processes);
 
 /// Prints the time and the disk that a run takes. `num_processes` share the time.

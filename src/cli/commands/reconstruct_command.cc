@@ -26,48 +26,40 @@ struct ReconstructArguments {
   std::optional<std::filesystem::path> trace, plan, choice;
 };
 
-// Returns the options, with a name for the tomogram that a dry run needs and does not write.
-Options with_output(Options options, bool dry_run) {
-  if (!options.output.empty()) return options;
+// Gives the tomogram of a dry run a name, which is needed and not written.
+void require_output(RunOptions& run, bool dry_run) {
+  if (!run.output.empty()) return;
   if (!dry_run)
     throw Error("--output is required: name the tomogram with -o (--dry-run needs none)");
-  options.output = "tomofield_dry_run.mrc";
-  options.overwrite = true;
-  return options;
+  run.output = "tomofield_dry_run.mrc";
+  run.overwrite = true;
 }
 
-void run(const ReconstructArguments& arguments, const distributed::Communicator& processes,
-         const std::vector<option_table::Setting>& origins) {
-  options::ReconstructOptions options = options::run_options(
-      arguments.choices.files, with_output(arguments.choices.options, arguments.dry_run));
-  options.origins = origins;
-  std::vector<io::OutputLock> locks;
+void run(ReconstructArguments& arguments, const distributed::Communicator& processes,
+         const std::vector<Setting>& origins) {
+  require_output(arguments.choices.options.run, arguments.dry_run);
+  option_table::note_settings(origins, arguments.choices);
+  options::ReconstructOptions options =
+      options::run_options(arguments.choices.files, arguments.choices.options);
   processes.run_collectively([&] {
-    locks = claim_run(options, arguments.dry_run || arguments.plan || !processes.is_root());
     check_answer_file(arguments.plan, "--plan", options);
     check_answer_file(arguments.choice, "--choice", options);
-    const output::OutputPaths paths = output::output_paths(options.resolved.output);
+    const output::OutputPaths paths = output::output_paths(options.run.output);
     check_trace_file(arguments.trace, {paths.volume, paths.model, paths.json}, options.files,
-                     options.resolved.overwrite);
+                     options.run.overwrite);
   });
-  if (arguments.plan) {
-    options.input.look_at_views = false;
-    return write_plan(*arguments.plan, tilt_series::TiltSeries(options.input, processes), options,
-                      processes);
-  }
-  options.input.keep_views = !arguments.dry_run;
+  if (arguments.plan) return write_plan(*arguments.plan, options, processes);
   run_traced(arguments.dry_run ? std::nullopt : arguments.trace, processes, [&] {
-    const tilt_series::TiltSeries series = open_series(options, arguments.dry_run, processes);
     if (arguments.choice && !arguments.dry_run)
-      return write_choice(*arguments.choice, series, options, processes);
-    run_reconstruction(series, options, arguments.dry_run, processes);
+      return write_choice(*arguments.choice, options, processes);
+    run_reconstruction(options, arguments.dry_run, processes);
   });
 }
 
 }  // namespace
 
 void add_reconstruct_command(CLI::App& program, const distributed::Communicator& processes,
-                             const std::vector<option_table::Setting>& origins) {
+                             const std::vector<Setting>& origins) {
   CLI::App& command = *program.add_subcommand(
       "reconstruct", "Reconstruct a tomogram and a model from a tilt series");
   auto arguments = std::make_shared<ReconstructArguments>();

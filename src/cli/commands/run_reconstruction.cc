@@ -15,8 +15,6 @@
 #include "base/progress.h"
 #include "base/stopwatch.h"
 #include "base/threads/parallel.h"
-#include "base/trace.h"
-#include "cli/commands/pictures.h"
 #include "cli/commands/plan_file.h"
 #include "cli/options/fit_options.h"
 #include "cli/options/table_options.h"
@@ -26,16 +24,10 @@
 #include "cli/terminal/stop_signal.h"
 #include "exchange/alignment_output.h"
 #include "exchange/exchange_files.h"
-#include "io/saving/atomic_file.h"
-#include "io/saving/output_set.h"
 #include "output/output_paths.h"
 #include "output/volume.h"
 #include "plan/plan.h"
-#include "realign/aligned_series.h"
 #include "reconstruct/reconstruct.h"
-#include "reconstruct/run_files.h"
-#include "report/pictures.h"
-#include "report/run_report.h"
 #include "tomofield/error.h"
 #include "verdict/verdict.h"
 
@@ -84,7 +76,7 @@ void print_plan(const options::ReconstructOptions& options, const plan::RunPlan&
   const std::string processes =
       num_processes == 1 ? "" : fmt::format(" of each of {} processes", num_processes);
   print("{} field, {} {}, {} parameters; {} steps on {}{}; about {:.2f} GiB of memory{}\n",
-        base::name_of(options.field.kind), plan.num_leaves,
+        base::name_of(*options.field.kind), plan.num_leaves,
         plan.num_leaves == 1 ? "leaf" : "leaves", plan.num_parameters, plan.num_steps,
         count_of(base::thread_count(), "thread"), processes,
         static_cast<double>(plan.memory_bytes) / (1 << 30), num_processes == 1 ? "" : " each");
@@ -97,7 +89,7 @@ void print_plan(const options::ReconstructOptions& options, const plan::RunPlan&
   }
   if (options.makes_halves())
     print("halves: two fits more, of one half of the {} each, after that of all data\n",
-          options.resolved.split_tilts ? "tilts" : "frames");
+          options.fit.split_tilts ? "tilts" : "frames");
   flush_output();  // the plan comes before other output, in a file too
 }
 
@@ -113,45 +105,7 @@ void print_files_of_halves(const output::OutputPaths& paths, bool with_linear_vo
 void print_files(const options::ReconstructOptions& options, const output::OutputPaths& paths) {
   print("tomogram  {}\nmodel     {}\nmetrics   {}\nreport    {}\n", paths.volume.string(),
         paths.model.string(), paths.json.string(), paths.report.string());
-  if (options.makes_halves()) print_files_of_halves(paths, options.resolved.denoising_halves);
-}
-
-// The pictures that trials draw, if there are any: of what --denoise does, and of what the learned
-// prior does.
-struct PicturesOfTrials {
-  std::optional<std::filesystem::path> dial, prior;
-};
-PicturesOfTrials pictures_of_trials(const options::ReconstructOptions& options) {
-  const output::OutputPaths paths = output::output_paths(options.resolved.output);
-  PicturesOfTrials drawn;
-  if (options.chooses_weight() && std::filesystem::exists(paths.dial_picture))
-    drawn.dial = paths.dial_picture;
-  if (options.open.prior && std::filesystem::exists(paths.prior_picture))
-    drawn.prior = paths.prior_picture;
-  return drawn;
-}
-
-// Writes the report of a run beside its other results, which have temporary names yet.
-void write_report(const reconstruction::Results& results,
-                  const options::ReconstructOptions& options, const std::filesystem::path& volume,
-                  const std::filesystem::path& mask_picture) {
-  const output::OutputPaths paths = output::output_paths(options.resolved.output);
-  const io::OutputSet& written = *io::OutputSet::active();
-  PicturesOfTrials of_trials = pictures_of_trials(options);
-  report::ReportSource source{.record = results.metrics,
-                              .files = options.files,
-                              .requested = options.requested,
-                              .volume = volume,
-                              .mask_picture = written.location_of(mask_picture),
-                              .tree_picture = {},
-                              .held_out_picture = {},
-                              .dial_picture = std::move(of_trials.dial),
-                              .prior_picture = std::move(of_trials.prior)};
-  if (options.field.tree == TreeKind::kAdaptive)
-    source.tree_picture = written.location_of(paths.tree_picture);
-  if (options.fit.hold_out > 0)
-    source.held_out_picture = written.location_of(paths.held_out_picture);
-  io::write_text_file(paths.report, report::run_report(source));
+  if (options.makes_halves()) print_files_of_halves(paths, options.fit.denoising_halves);
 }
 
 ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
@@ -159,7 +113,45 @@ ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
   return {
       stop_status(),
       fmt::format("stopped; {} '{}': continue with the same command and --resume{}", what_is_there,
-                  file.string(), options.resolved.overwrite ? " instead of --overwrite" : "")};
+                  file.string(), options.run.overwrite ? " instead of --overwrite" : "")};
+}
+
+// Throws the ExitStatus of a run that was stopped.
+void require_finished(const reconstruction::RunResult& run,
+                      const options::ReconstructOptions& options,
+                      const output::OutputPaths& paths) {
+  switch (run.outcome) {
+    case reconstruction::Outcome::kFinished:
+      return;
+    case reconstruction::Outcome::kStopped:
+      throw stopped("the checkpoint is", run.checkpoint, options);
+    case reconstruction::Outcome::kStoppedTuning:
+      if (options.fit.tune) throw stopped("the finished trials are in", paths.trials, options);
+      throw ExitStatus{stop_status(), "stopped before the first checkpoint"};
+    case reconstruction::Outcome::kStoppedAligning:
+      throw_stopped_alignment();
+  }
+}
+
+void warn_of_unused_rank(const options::ReconstructOptions& options) {
+  if (options.field.kind == FieldKind::kGrid && !options.field.rank.is_left_to_trials())
+    base::log_warning(
+        "--rank changes nothing: it is for factors (--field vm), and this field has plain "
+        "vertices");
+}
+
+void print_results(const reconstruction::RunResult& run, const options::ReconstructOptions& options,
+                   const output::OutputPaths& paths) {
+  print_files(options, paths);
+  for (const auto& file : exchange::volume_descriptions(options))
+    print("exchange  {}\n", file.string());
+  print_alignment(options);
+  if (options.volume.zarr) print("OME-Zarr  {}\n", output::zarr_path(paths.volume).string());
+  print_pictures(run.pictures);
+  if (options.field.tree == TreeKind::kAdaptive)
+    print("tree      {}\n", paths.tree_picture.string());
+  flush_output();  // the verdict comes last
+  verdict::log_verdict(run.verdict);
 }
 
 }  // namespace
@@ -173,101 +165,53 @@ void add_run_options(CLI::App& command, option_table::Choices& choices, bool& dr
       ->group(std::string(title_of(option_table::Group::kRun)));
 }
 
-std::vector<io::OutputLock> claim_run(const options::ReconstructOptions& options,
-                                      bool check_alone) {
-  if (options.resolved.output.empty()) throw Error("-o '' names no file: name the tomogram");
-  if (!check_alone) return reconstruction::claim_outputs(options);
-  reconstruction::check_options(options);
-  return {};
+reconstruction::Observer terminal_observer(const distributed::Communicator& processes) {
+  reconstruction::Observer observer;
+  observer.stop_requested = stop_was_requested;
+  if (!processes.is_root()) return observer;
+  observer.alignment = make_progress_bar("align");
+  observer.trials = make_progress_bar("tune");
+  observer.fit = make_progress_bar("reconstruct");
+  return observer;
 }
 
-tilt_series::TiltSeries open_series(options::ReconstructOptions& options, bool dry_run,
-                                    const distributed::Communicator& processes) {
-  if (dry_run || options.resolved.align == Alignment::kOff)
-    return tilt_series::TiltSeries(options.input, processes);
-  plan::check_before_alignment(options, processes);
-  return align_and_open(options, processes);
-}
+void throw_stopped_alignment() { throw ExitStatus{stop_status(), "stopped during the alignment"}; }
 
-tilt_series::TiltSeries align_and_open(options::ReconstructOptions& options,
-                                       const distributed::Communicator& processes) {
-  stop_on_signals(processes.size() > 1);
-  base::ProgressSink progress;
-  if (processes.is_root()) progress = make_progress_bar("align");
-  if (!realign::align_series(options, {.progress = progress, .stop_requested = stop_was_requested},
-                             processes))
-    throw ExitStatus{stop_status(), "stopped during the alignment"};
-  return tilt_series::TiltSeries(options.input, processes);
+void print_pictures(const std::vector<std::filesystem::path>& pictures) {
+  print("pictures ");
+  for (const std::filesystem::path& picture : pictures) print(" {}", picture.string());
+  print("\n");
 }
 
 void print_alignment(const options::ReconstructOptions& options) {
-  if (options.resolved.align == Alignment::kOff) return;
-  print("alignment {}\n", output::output_paths(options.resolved.output).alignment.string());
+  if (options.run.align == Alignment::kOff) return;
+  print("alignment {}\n", output::output_paths(options.run.output).alignment.string());
   for (const auto& file : exchange::alignment_results(options))
     if (std::filesystem::exists(file)) print("          {}\n", file.string());
 }
 
-void run_reconstruction(const tilt_series::TiltSeries& series,
-                        const options::ReconstructOptions& options, bool dry_run,
+void run_reconstruction(const options::ReconstructOptions& options, bool dry_run,
                         const distributed::Communicator& processes) {
-  processes.run_collectively([&] {
-    const plan::RunPlan plan = plan::require_possible_run(series, options, processes);
-    if (options.field.kind == FieldKind::kGrid && options.requested.rank != Options().rank)
-      base::log_warning(
-          "--rank changes nothing: it is for factors (--field vm), and this field has plain "
-          "vertices");
+  if (options.run.output.empty()) throw Error("-o '' names no file: name the tomogram");
+  const auto show_plan = [&](const plan::RunPlan& plan) {
+    warn_of_unused_rank(options);
     print_plan(options, plan, processes.size());
-    if (dry_run && processes.is_root())
-      print_estimate(plan::estimate_run(series, options, plan), processes.size());
-  });
-  if (dry_run) return;
-  const output::OutputPaths paths = output::output_paths(options.resolved.output);
+  };
+  if (dry_run) {
+    const reconstruction::Preview preview = reconstruction::preview(options, processes);
+    show_plan(preview.plan);
+    if (processes.is_root()) print_estimate(preview.estimate, processes.size());
+    return;
+  }
+  const output::OutputPaths paths = output::output_paths(options.run.output);
   const bool is_job = processes.size() > 1;
   stop_on_signals(is_job);
   if (is_job) processes.set_waiting_callback(tell_if_stuck(paths.model, processes));
-  std::vector<std::filesystem::path> pictures;
-  reconstruction::ReconstructHooks hooks{
-      .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};
-  hooks.write_more = [&](const reconstruction::Results& results,
-                         const std::filesystem::path& volume) {
-    pictures = write_pictures(volume, series, results.bead_masking, paths.picture_prefix);
-    exchange::write_exchange_files(series, options, volume);
-    if (options.field.tree == TreeKind::kAdaptive) {
-      const base::TraceSpan span("draw tree");
-      report::write_tree_picture(*results.model, paths.tree_picture);
-    }
-    write_report(results, options, volume, pictures.back());
-    for (const auto& picture : {paths.held_out_picture, paths.choice_picture})
-      if (io::OutputSet::active()->contains(picture)) pictures.push_back(picture);
-    const PicturesOfTrials of_trials = pictures_of_trials(options);
-    for (const auto& picture : {of_trials.dial, of_trials.prior})
-      if (picture) pictures.push_back(*picture);
-  };
-  if (processes.is_root()) {
-    hooks.progress = make_progress_bar("reconstruct");
-    hooks.tune_progress = make_progress_bar("tune");
-  }
-  const auto run = reconstruction::reconstruct(series, options, hooks, processes);
-  switch (run.outcome) {
-    case reconstruction::Outcome::kFinished:
-      break;
-    case reconstruction::Outcome::kStopped:
-      throw stopped("the checkpoint is", run.checkpoint, options);
-    case reconstruction::Outcome::kStoppedTuning:
-      if (options.resolved.tune) throw stopped("the finished trials are in", paths.trials, options);
-      throw ExitStatus{stop_status(), "stopped before the first checkpoint"};
-  }
-  if (!processes.is_root()) return;
-  print_files(options, paths);
-  for (const auto& file : exchange::volume_descriptions(options))
-    print("exchange  {}\n", file.string());
-  print_alignment(options);
-  if (options.volume.zarr) print("OME-Zarr  {}\n", output::zarr_path(paths.volume).string());
-  print_pictures(pictures);
-  if (options.field.tree == TreeKind::kAdaptive)
-    print("tree      {}\n", paths.tree_picture.string());
-  flush_output();  // the verdict comes last
-  verdict::log_verdict(run.results->verdict);
+  reconstruction::Observer observer = terminal_observer(processes);
+  observer.planned = show_plan;
+  const reconstruction::RunResult run = reconstruction::run(options, observer, processes);
+  require_finished(run, options, paths);
+  if (processes.is_root()) print_results(run, options, paths);
 }
 
 }  // namespace tomofield::cli

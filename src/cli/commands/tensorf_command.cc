@@ -5,6 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "base/check.h"
+#include "base/log_pause.h"
 #include "baseline/neural/tensorf.h"
 #include "cli/commands/run_reconstruction.h"
 #include "cli/options/common_options.h"
@@ -12,6 +14,7 @@
 #include "cli/options/help_formatter.h"
 #include "cli/options/table_options.h"
 #include "cli/options/trace_option.h"
+#include "option_table/setting.h"
 #include "options/run_options.h"
 #include "output/output_paths.h"
 
@@ -33,31 +36,33 @@ void add_method_options(CLI::App& command, TensorfArguments& arguments) {
   add_non_negative(command, arguments.non_negative);
 }
 
-void run(TensorfArguments& arguments, const std::vector<option_table::Setting>& origins) {
+// Returns the side of the one node, which the headers of the series decide.
+int size_of_node(const options::ReconstructOptions& options) {
+  const base::LogPause pause;  // the run says it
+  tilt_series::TiltSeriesOptions headers = options.input();
+  headers.look_at_views = false;
+  return baseline::one_node_size(tilt_series::TiltSeries(headers), options);
+}
+
+void run(TensorfArguments& arguments, const std::vector<Setting>& origins) {
+  option_table::note_settings(origins, arguments.choices);
   Options& requested = arguments.choices.options;
   if (arguments.non_negative)
-    requested.activation = *arguments.non_negative ? Activation::kSoftplus : Activation::kIdentity;
+    requested.field.activation =
+        *arguments.non_negative ? Activation::kSoftplus : Activation::kIdentity;
   options::ReconstructOptions options = options::run_options(arguments.choices.files, requested);
-  options.origins = origins;
-  options.field.depth = 0;  // the tree is one node
-  const std::vector<io::OutputLock> locks = claim_run(options, arguments.dry_run);
-  const output::OutputPaths paths = output::output_paths(options.resolved.output);
+  const output::OutputPaths paths = output::output_paths(options.run.output);
   check_trace_file(arguments.trace, {paths.volume, paths.model, paths.json}, options.files,
-                   options.resolved.overwrite);
-  options.input.keep_views = !arguments.dry_run;
-  const auto& alone = distributed::Communicator::alone();
-  run_traced(arguments.dry_run ? std::nullopt : arguments.trace, alone, [&] {
-    const tilt_series::TiltSeries series(options.input);
-    options.field.leaf_size = baseline::one_node_size(
-        plan_measurement(series, options.specimen).roi, options.fit.coarse_bin);
-    options.resolved.leaf_size = options.field.leaf_size;
-    run_reconstruction(series, options, arguments.dry_run);
-  });
+                   options.run.overwrite);
+  base::require_no_faults(options.faults());
+  options.field.leaf_size = size_of_node(options);
+  run_traced(arguments.dry_run ? std::nullopt : arguments.trace, distributed::Communicator::alone(),
+             [&] { run_reconstruction(options, arguments.dry_run); });
 }
 
 }  // namespace
 
-void add_tensorf(CLI::App& baseline, const std::vector<option_table::Setting>& origins) {
+void add_tensorf(CLI::App& baseline, const std::vector<Setting>& origins) {
   CLI::App& command = *baseline.add_subcommand(
       "tensorf", "One factorised tensor for the whole region, coarse to fine, as in TensoRF");
   const auto arguments = std::make_shared<TensorfArguments>();

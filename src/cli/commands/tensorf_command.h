@@ -8,6 +8,6 @@
 namespace tomofield::cli {
 
 /// Registers `baseline tensorf`.
-void add_tensorf(CLI::App& baseline, const std::vector<option_table::Setting>& origins);
+void add_tensorf(CLI::App& baseline, const std::vector<Setting>& origins);
 
 }  // namespace tomofield::cli

@@ -155,7 +155,7 @@ std::vector<io::OutputLock> EvaluateArguments::claim_outputs() const {
                     "{:g}°",
                     tilts->low_deg, tilts->high_deg));
   Options series_options = choices.options;
-  series_options.thickness = 1;  // the volume has its own
+  series_options.specimen.thickness = 1;  // the volume has its own
   base::require_no_faults(option_table::range_faults(series_options));
   std::vector<std::filesystem::path> inputs = io::input_files(choices.files), outputs;
   inputs.push_back(volume);

@@ -21,7 +21,6 @@
 namespace tomofield::cli {
 namespace {
 
-using option_table::Setting;
 using Words = std::vector<std::string>;
 
 constexpr const char* kStack = "stack";

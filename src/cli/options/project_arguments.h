@@ -16,7 +16,6 @@ void add_project_options(CLI::App& command);
 /// setting with the file that it comes from, and returns those that are used. Arguments without a
 /// project stay as they are. Call it after expand_config_file(). Throws Error for a project that
 /// cannot be honoured.
-std::vector<option_table::Setting> expand_project(const CLI::App& program,
-                                                  std::vector<std::string>& arguments);
+std::vector<Setting> expand_project(const CLI::App& program, std::vector<std::string>& arguments);
 
 }  // namespace tomofield::cli

@@ -14,46 +14,25 @@ using option_table::Choices;
 using option_table::Group;
 using option_table::Row;
 
-// Returns the rows that share a flag, as --center does.
-std::vector<const Row*> rows_with(std::string_view flag) {
-  std::vector<const Row*> rows;
-  for (const Row& row : option_table::all_rows())
-    if (row.flag == flag) rows.push_back(&row);
-  return rows;
-}
-
-// Sets the rows of a flag, one from each part of a list. Returns what the text must be, or nothing.
-std::string set_rows(const std::vector<const Row*>& rows, const std::string& text,
-                     Choices& choices) {
-  if (rows.size() == 1) return set_from_text(*rows.front(), text, choices);
-  const std::vector<std::string> parts = CLI::detail::split(text, ',');
-  if (parts.size() > rows.size()) return fmt::format("at most {} numbers", rows.size());
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    const std::string wanted = set_from_text(*rows[i], parts[i], choices);
-    if (!wanted.empty()) return wanted;
-  }
-  return {};
-}
-
 CLI::Option* add_flag(CLI::App& command, const Row& row, Choices& choices) {
-  const bool value = !row.flag.starts_with("--no-");
   return command.add_flag_callback(
       std::string(row.flag),
-      [&row, &choices, value] { set_from_text(row, value ? "true" : "false", choices); },
+      [&row, &choices] { option_table::set_flag_from_text(row.flag, "true", choices); },
       std::string(row.help));
 }
 
 CLI::Option* add_value(CLI::App& command, const Row& row, Choices& choices) {
-  const std::vector<const Row*> rows = rows_with(row.flag);
-  const auto check = [rows](const std::string& text) -> std::string {
+  const auto check = [&row](const std::string& text) -> std::string {
     Choices scratch;
-    const std::string wanted = set_rows(rows, text, scratch);
+    const std::string wanted = option_table::set_flag_from_text(row.flag, text, scratch);
     return wanted.empty() ? "" : fmt::format("must be {}, not '{}'", wanted, text);
   };
   return command
       .add_option_function<std::string>(
           std::string(row.flag),
-          [rows, &choices](const std::string& text) { set_rows(rows, text, choices); },
+          [&row, &choices](const std::string& text) {
+            option_table::set_flag_from_text(row.flag, text, choices);
+          },
           std::string(row.help))
       ->check(CLI::Validator(check, ""))
       ->type_name(option_table::label_of(row))
@@ -84,7 +63,8 @@ CLI::Option* add_row(CLI::App& command, std::string_view key, Choices& choices,
 void add_groups(CLI::App& command, Choices& choices, std::initializer_list<Group> groups) {
   for (const Group group : groups) {
     for (const Row& row : option_table::all_rows()) {
-      if (row.group == group && rows_with(row.flag).front() == &row) add_row(command, row, choices);
+      if (row.group == group && &option_table::rows_of_flag(row.flag).front() == &row)
+        add_row(command, row, choices);
     }
   }
 }

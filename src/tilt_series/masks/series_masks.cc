@@ -44,7 +44,7 @@ double given_diameter_px(double diameter_nm, const SeriesPlan& plan) {
 
 BeadSearchOptions search_options(const TiltSeriesOptions& options, const SeriesPlan& plan) {
   BeadSearchOptions search;
-  if (options.bead_diameter_nm) {
+  if (options.bead_diameter_nm.has_value()) {
     search.diameter_px = given_diameter_px(*options.bead_diameter_nm, plan);
     return search;
   }
@@ -114,7 +114,8 @@ void add_beads(const TiltSeriesOptions& options, const SeriesPlan& plan, const B
   metrics.num_beads = search.num_beads;
   metrics.bead_diameter_A = search.diameter_px * binned_pixel_A(plan);
   if (search.num_beads == 0) return;
-  const bool is_undecided = options.contrast == Contrast::kBright && !options.bead_diameter_nm;
+  const bool is_undecided =
+      options.contrast == Contrast::kBright && !options.bead_diameter_nm.has_value();
   metrics.bead_masking = is_undecided ? BeadMasking::kUndecided : BeadMasking::kMasked;
   (is_undecided ? masks->undecided : masks->discs) = std::move(search.discs);
 }

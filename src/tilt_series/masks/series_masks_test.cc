@@ -158,7 +158,7 @@ TEST(SeriesMasks, FiducialsThatDoNotFitAreRefused) {
   options.fiducials = scratch.write("f.txt", "70 30 0\n");
   expect_refusal(options, {"line 1", "70, 30", "64 × 48"});
   options.fiducials = scratch.write("f.txt", "20 30 0\n");
-  options.bead_diameter_nm.reset();
+  options.bead_diameter_nm = {};
   expect_refusal(options, {"f.txt", "--bead-diameter"});
 }
 

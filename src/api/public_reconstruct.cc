@@ -4,15 +4,11 @@
 
 #include "base/log.h"
 #include "base/threads/parallel.h"
-#include "exchange/exchange_files.h"
 #include "io/images/image_stack.h"
 #include "io/json.h"
 #include "options/run_options.h"
 #include "output/public_model.h"
-#include "plan/plan.h"
-#include "realign/aligned_series.h"
 #include "reconstruct/reconstruct.h"
-#include "reconstruct/run_files.h"
 #include "tomofield/error.h"
 #include "tomofield/messages.h"
 #include "tomofield/reconstruct.h"
@@ -34,7 +30,7 @@ namespace {
 options::ReconstructOptions internal_options(const TiltSeries& series, const Options& options) {
   const auto& input = TiltSeriesAccess::impl(series);
   auto internal = options::run_options(input.files, options);
-  internal.input.images = input.images;
+  internal.images = input.images;
   return internal;
 }
 
@@ -43,10 +39,13 @@ class Listener {
  public:
   explicit Listener(const ProgressCallback& callback) : callback_(callback) {}
 
-  reconstruction::ReconstructHooks hooks() {
+  reconstruction::Observer observer() {
     if (!callback_) return {};
-    return {.progress = [this](const base::ProgressReport& report) { tell(report, false); },
-            .tune_progress = [this](const base::ProgressReport& report) { tell(report, true); },
+    const auto tell_trial = [this](const base::ProgressReport& report) { tell(report, true); };
+    return {.planned = {},
+            .alignment = tell_trial,
+            .trials = tell_trial,
+            .fit = [this](const base::ProgressReport& report) { tell(report, false); },
             .stop_requested = [this] { return wants_stop_; }};
   }
 
@@ -104,32 +103,23 @@ TiltSeries TiltSeries::from_images(ViewImages images) {
 Reconstruction reconstruct(const TiltSeries& series, const Options& options,
                            const ProgressCallback& progress) {
   const OneAtATime turn;
-  options::ReconstructOptions internal = internal_options(series, options);
-  const auto locks = reconstruction::claim_outputs(internal);
   Listener listener(progress);
-  reconstruction::ReconstructHooks hooks = listener.hooks();
-  plan::check_before_alignment(internal);
-  if (!realign::align_series(
-          internal, {.progress = hooks.tune_progress, .stop_requested = hooks.stop_requested},
-          distributed::Communicator::alone()))
-    return {};
-  const tilt_series::TiltSeries views(internal.input);
-  const plan::RunPlan plan = plan::plan_run(views, internal);
-  require_memory(plan);
-  require_few_vertices(plan);
-  hooks.write_more = [&](const reconstruction::Results&, const std::filesystem::path& volume) {
-    exchange::write_exchange_files(views, internal, volume);
-  };
-  reconstruction::RunResult run = reconstruction::reconstruct(views, internal, hooks);
-  if (!run.results) return {};
-  Reconstruction made{.is_finished = true,
-                      .tomogram = {},
-                      .model = {},
-                      .metrics = io::json_text(run.results->metrics)};
-  if (options.output.empty())
-    made.tomogram = output::sample_tomogram(*run.results->model, options.invert);
-  if (run.results->model) made.model = ModelAccess::make(std::move(*run.results->model));
+  reconstruction::RunResult run =
+      reconstruction::run(internal_options(series, options), listener.observer());
+  if (run.outcome != reconstruction::Outcome::kFinished) return {};
+  Reconstruction made{
+      .is_finished = true, .tomogram = {}, .model = {}, .metrics = io::json_text(run.metrics)};
+  if (options.run.output.empty())
+    made.tomogram = output::sample_tomogram(*run.model, options.volume.invert);
+  if (run.model) made.model = ModelAccess::make(std::move(*run.model));
   return made;
+}
+
+bool align(const TiltSeries& series, const Options& options, const ProgressCallback& progress) {
+  const OneAtATime turn;
+  Listener listener(progress);
+  options::ReconstructOptions internal = internal_options(series, options);
+  return reconstruction::align(internal, listener.observer());
 }
 
 Options resolve_options(const Options& options, const SeriesFiles& files) {

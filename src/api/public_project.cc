@@ -1,0 +1,37 @@
+#include <fmt/format.h>
+
+#include <optional>
+#include <string>
+
+#include "io/saving/output_files.h"
+#include "option_table/name_list.h"
+#include "option_table/setting.h"
+#include "option_table/values.h"
+#include "projects/project.h"
+#include "tomofield/error.h"
+#include "tomofield/project.h"
+
+namespace tomofield {
+
+Project open_project(const ProjectRequest& request) {
+  option_table::Choices choices;
+  choices.files.stack = request.path;
+  choices.options.views.ignore = request.ignore;
+  const std::optional<projects::Project> project =
+      projects::read_project({.path = request.path,
+                              .ignored = option_table::split_names(request.ignore),
+                              .series = request.series});
+  if (!project) return {choices.files, choices.options, {}};
+  for (const auto& file : project->files()) io::add_input(file);
+  for (const Setting& setting : project->settings()) {
+    const std::string wanted =
+        option_table::set_flag_from_text(setting.option, setting.value, choices);
+    if (!wanted.empty())
+      throw Error(fmt::format("{} of '{}' must be {}, not '{}'", setting.entry,
+                              setting.file.string(), wanted, setting.value));
+  }
+  option_table::note_settings(project->settings(), choices);
+  return {choices.files, choices.options, project->warnings()};
+}
+
+}  // namespace tomofield

@@ -1,0 +1,92 @@
+"""A project of another program gives the same files from the command line, Python and C++."""
+
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+import tomofield
+
+ENTRIES = ["$tilt -StandardInput", "InputProjections TS_01_ali.mrc", "TILTFILE TS_01.tlt",
+           "THICKNESS 16", "OFFSET 0.5", "FULLIMAGE 32 32"]
+QUICK = {"contrast": "bright", "with_margin": False, "epochs": 2, "coarse_epochs": 4}
+
+
+@pytest.fixture(scope="module")
+def folder(series, tmp_path_factory):
+    """Returns a folder as eTomo writes it."""
+    path = tmp_path_factory.mktemp("etomo")
+    shutil.copy(series.folder / "s.mrc", path / "TS_01.st")
+    np.savetxt(path / "TS_01.tlt", series.tilt_deg, fmt="%.2f")
+    (path / "TS_01.xf").write_text("1 0 0 1 0.5 -1\n" * len(series.tilt_deg))
+    (path / "newst.com").write_text("$newstack -StandardInput\nInputFile TS_01.st\n"
+                                    "OutputFile TS_01_ali.mrc\nTransformFile TS_01.xf\n")
+    (path / "tilt.com").write_text("\n".join(ENTRIES) + "\n")
+    return path
+
+
+def without_times(path):
+    """Returns the metrics without what differs from run to run."""
+    volatile = ("seconds", "peak_GiB", "line", "threads", "fingerprint", "output")
+
+    def strip(value):
+        if isinstance(value, dict):
+            return {k: strip(v) for k, v in value.items() if not k.startswith(volatile)}
+        return [strip(v) for v in value] if isinstance(value, list) else value
+
+    return strip(json.loads(path.read_text()))
+
+
+def test_the_files_are_those_of_the_command_line(program, folder, tmp_path):
+    subprocess.run([program, "reconstruct", folder, "--contrast", "bright", "--no-margin",
+                    "--epochs", "2", "--coarse-epochs", "4", "-o", tmp_path / "cli.mrc"],
+                   check=True, capture_output=True)
+    tomofield.reconstruct(folder, output=tmp_path / "py.mrc", **QUICK)
+    by_program = {path.name.removeprefix("cli") for path in tmp_path.glob("cli*")}
+    assert by_program == {path.name.removeprefix("py") for path in tmp_path.glob("py*")}
+    assert {".mrc", ".h5", ".json", "_report.html", "_xy.png", "_mask.png"} <= by_program
+    for end in by_program:
+        if end.endswith((".png", ".mrc")):
+            assert (tmp_path / f"cli{end}").read_bytes() == (tmp_path / f"py{end}").read_bytes(), end
+    assert without_times(tmp_path / "cli.json") == without_times(tmp_path / "py.json")
+    for page in ("cli_report.html", "py_report.html"):
+        assert "THICKNESS" in (tmp_path / page).read_text()
+
+
+def test_a_project_says_what_its_files_set(folder):
+    project = tomofield.open_project(folder)
+    settings = {setting.option: setting for setting in project.settings}
+    assert settings["--thickness"].value == "16"
+    assert settings["--thickness"].file == folder / "tilt.com"
+    assert settings["--thickness"].entry == "THICKNESS"
+    assert project.thickness == 16 and project.tilt_offset_deg == 0.5
+    assert project.stack == folder / "TS_01.st" and project.epochs is None
+    with pytest.raises(AttributeError):
+        project.epochz
+
+
+def test_options_go_over_a_project(folder, tmp_path):
+    tomofield.reconstruct(folder, output=tmp_path / "o.mrc", tilt_offset_deg=0.25, **QUICK)
+    record = tomofield.read_metrics(tmp_path / "o.mrc")
+    assert record["options"]["input"]["tilt_offset_deg"] == 0.25
+    used = {origin["option"] for origin in record["origins"]}
+    assert "--tilt-offset" not in used and "--thickness" in used
+
+
+def test_a_stack_is_a_project_of_itself(series):
+    project = tomofield.open_project(series.folder / "s.mrc")
+    assert project.settings == [] and project.stack == series.folder / "s.mrc"
+
+
+def test_projects_that_cannot_be_read_are_named(tmp_path):
+    with pytest.raises(tomofield.Error, match="has no project"):
+        tomofield.open_project(tmp_path)
+
+
+def test_align_writes_the_alignment_alone(series, tmp_path):
+    assert tomofield.align(series.folder / "s.mrc", tlt=series.folder / "s.tlt", thickness=16,
+                           contrast="bright", with_margin=False, output=tmp_path / "a.mrc")
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"a_align.xf", "a_align.tlt", "a_align.json"} <= names and "a.mrc" not in names
