@@ -65,12 +65,15 @@ struct Rectangle {
 /// How the views are read, and what the microscope did to them. Lengths are unbinned pixels of the
 /// aligned view.
 struct ViewOptions {
-  double tilt_offset_deg = 0;    ///< added to all tilt angles
-  double x_axis_tilt_deg = 0;    ///< tilt of the specimen about X, which the volume turns back
-  std::string exclude;           ///< 1-based sections to leave out: "1-3,40"
-  std::string ignore;            ///< entries of other programs' files that are not applied
-  double bin = 1.0;              ///< reduce views by this factor, at least 1
-  std::optional<double> angpix;  ///< or to this pixel size in Å
+  double tilt_offset_deg = 0;  ///< added to all tilt angles
+  double x_axis_tilt_deg = 0;  ///< tilt of the specimen about X, which the volume turns back
+  /// Direction of the tilt axis in a raw stack, counter-clockwise from +Y; default: what files
+  /// state.
+  std::optional<double> tilt_axis_deg;
+  std::string exclude;                 ///< 1-based sections to leave out: "1-3,40"
+  std::string ignore;                  ///< entries of other programs' files that are not applied
+  double bin = 1.0;                    ///< reduce views by this factor, at least 1
+  std::optional<double> angpix;        ///< or to this pixel size in Å
   std::optional<double> pixel_size_A;  ///< overrides the header's pixel size
   Contrast contrast = Contrast::kDark;
   bool take_log = false;       ///< −ln(I / I0) instead of I0 − I; dark contrast only

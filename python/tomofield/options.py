@@ -23,6 +23,7 @@ class Options(TypedDict, total=False):
     mdoc: Optional[_Path]
     tilt_offset_deg: float
     x_axis_tilt_deg: float
+    tilt_axis_deg: Optional[float]
     exclude: str
     ignore: str
 

@@ -120,6 +120,11 @@ JobPlan read_plan(const fs::path& file) {
   });
 }
 
+std::string read_stack(const fs::path& file) {
+  return read_job_file(file, "the plan of a run",
+                       [](const json& plan) { return plan.value("stack", std::string()); });
+}
+
 void write_jobs(const fs::path& file, const JobList& list) {
   json jobs = json::array();
   for (const Job& job : list.jobs) jobs.push_back(job_json(job));

@@ -55,6 +55,10 @@ struct JobPlan {
 /// Reads the JSON of --plan. Throws Error for anything else.
 JobPlan read_plan(const std::filesystem::path& file);
 
+/// Returns the stack of the run that this JSON of --plan describes, or an empty text. Throws Error
+/// for anything else.
+std::string read_stack(const std::filesystem::path& file);
+
 /// Writes the list of a batch, from which the tasks of a job array read their jobs. Throws Error if
 /// it cannot be written, and for words that are no UTF-8.
 void write_jobs(const std::filesystem::path& file, const JobList& list);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "base/system/child_process.h"
@@ -46,6 +47,22 @@ void add_plan(JobPlan plan, Job& job) {
   job.files = std::move(plan.files);
 }
 
+// The stacks of the series so far. A pattern may name a stack and the alignment or the metadata
+// beside it, which would reconstruct it twice. Series with options of their own may share a stack.
+class Stacks {
+ public:
+  void require_new(const std::string& stack, const Series& series, Faults& faults) {
+    if (stack.empty() || !series.options.empty()) return;
+    const auto [first, is_new] = sources_.emplace(stack, series.source);
+    if (is_new) return;
+    faults.add(fmt::format("{} and {} are of the same stack '{}': leave one of them out",
+                           first->second, series.source, stack));
+  }
+
+ private:
+  std::map<std::string, std::string> sources_;  // by stack
+};
+
 }  // namespace
 
 fs::path output_of(const Series& series, const fs::path& folder) {
@@ -70,6 +87,7 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
   const io::ScratchFolder scratch(options.folder, ".tomofield-plan");
   const fs::path plan = scratch.path() / "plan.json", log = scratch.path() / "log";
   Faults faults;
+  Stacks stacks;
   JobList list{.jobs = {}, .overwrites = options.overwrites};
   for (const Series& series : all) {
     Job job{.name = series.name,
@@ -86,8 +104,10 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
       if (result.exit_status != 0)
         faults.add(
             fmt::format("{}: {}", series.source, base::reason_of_failure(result.exit_status, log)));
-      else
+      else {
         add_plan(read_plan(plan), job);
+        stacks.require_new(read_stack(plan), series, faults);
+      }
     }
     list.jobs.push_back(std::move(job));
   }

@@ -146,6 +146,10 @@ void print_answer(const CLI::App& program, const CLI::ParseError& request) {
 // Returns the exit status, or throws.
 int run_command(CLI::App& program, std::vector<std::string> arguments,
                 const distributed::Communicator& processes, std::vector<Setting>& origins) {
+  if (arguments.empty()) {
+    print_text(program.help());
+    return report_output(/*is_result=*/true);
+  }
   processes.run_collectively([&] {
     require_known_command(program, arguments);
     require_shared_command(arguments, processes);

@@ -15,6 +15,7 @@
 #include "io/tables/mtf_table.h"
 #include "io/tables/view_table.h"
 #include "microscope/exposure.h"
+#include "tilt_series/match_by_tilt.h"
 #include "tilt_series/open_views.h"
 #include "tomofield/error.h"
 
@@ -37,29 +38,88 @@ void require_pixel_size(const tilt_series::TiltSeriesOptions& input,
                   stack));
 }
 
-void require_sections(std::size_t count, std::int64_t num_sections,
-                      const std::filesystem::path& file, const char* what,
-                      const std::string& stack) {
-  if (static_cast<std::int64_t>(count) == num_sections) return;
-  throw Error(
-      fmt::format("'{}' has the {} of {} sections, but '{}' has {}: give the file of this stack",
-                  file.string(), what, count, stack, num_sections));
+// What is known of the sections of a stack when a table is matched to them.
+struct Sections {
+  const tilt_series::TiltSeriesOptions& input;
+  std::string stack;
+  std::int64_t count = 0;
+  std::vector<std::optional<double>> tilt_deg;  // [section], as recorded; none: not used
+};
+
+Sections sections_of(const tilt_series::TiltSeriesOptions& input,
+                     const tilt_series::TiltSeries& series) {
+  const auto stack = tilt_series::open_views(input);
+  Sections sections{input, stack->name(), stack->header().nz, {}};
+  sections.tilt_deg.resize(static_cast<std::size_t>(sections.count));
+  for (const tilt_series::View& view : series.views())
+    sections.tilt_deg[static_cast<std::size_t>(view.section)] =
+        view.tilt_deg - input.tilt_offset_deg;
+  return sections;
+}
+
+// Returns the row of a table for each section. A table that has not one row a section is matched by
+// the rows of AreTomo's alignment, whose dark frames it may leave out, or by tilt. Rows have the
+// contrast transfer (`is_ctf`) or doses. Throws Error if neither tells.
+std::vector<std::optional<std::size_t>> rows_of_sections(
+    const Sections& sections, std::size_t num_rows,
+    std::span<const std::optional<double>> row_tilt_deg, const std::filesystem::path& file,
+    bool is_ctf) {
+  const char* const what = is_ctf ? "contrast transfer" : "doses";
+  std::vector<std::optional<std::size_t>> rows(static_cast<std::size_t>(sections.count));
+  if (static_cast<std::int64_t>(num_rows) == sections.count) {
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = i;
+    return rows;
+  }
+  if (sections.input.aln) {
+    const auto alignment = io::read_aretomo_alignment(*sections.input.aln, /*needs_tilt=*/false);
+    if (alignment.rows.size() == num_rows) {
+      const auto assigned = io::assign_aretomo_sections(alignment, *sections.input.aln,
+                                                        sections.count, sections.stack);
+      for (std::size_t row = 0; row < num_rows; ++row)
+        rows[static_cast<std::size_t>(assigned[row])] = row;
+      return rows;
+    }
+  }
+  if (!row_tilt_deg.empty())
+    if (const auto matched = tilt_series::match_by_tilt(sections.tilt_deg, row_tilt_deg))
+      return *matched;
+  throw Error(fmt::format(
+      "'{}' has the {} of {} sections, but '{}' has {}, and {}: give the file of this stack{}",
+      file.string(), what, num_rows, sections.stack, sections.count,
+      row_tilt_deg.empty() ? "it has no tilts to tell which belong together"
+                           : "their tilts do not tell which belong together",
+      is_ctf ? " (--ctf none goes on without it)" : ""));
+}
+
+// Puts the rows of a table of contrast transfer into the order of the sections.
+void match_sections(const Sections& sections, io::CtfTable& table) {
+  const auto count = static_cast<std::size_t>(sections.count);
+  if (table.goes_on && table.views.size() < count) {
+    table.views.resize(count, table.views.back());
+    return;
+  }
+  const auto rows = rows_of_sections(sections, table.views.size(), table.tilt_deg, table.file,
+                                     /*is_ctf=*/true);
+  std::vector<std::optional<io::Defocus>> matched(count);
+  for (std::size_t i = 0; i < count; ++i)
+    if (rows[i]) matched[i] = table.views[*rows[i]];
+  table.views = std::move(matched);
 }
 
 // Returns the contrast transfer of each section, or nothing without any.
 std::optional<io::CtfTable> find_ctf(const SeriesFiles& files, const ViewOptions& options,
-                                     std::int64_t num_sections, const std::string& stack) {
+                                     const Sections& sections) {
   if (const auto& um = options.defocus_um) {
     const double defocus_A = *um * kAngstroms_in_um;
     io::CtfTable table;
-    table.views.assign(static_cast<std::size_t>(num_sections),
+    table.views.assign(static_cast<std::size_t>(sections.count),
                        io::Defocus{defocus_A, defocus_A, 0.0, 0.0});
     base::log_info(fmt::format("ctf: an underfocus of {} µm in all views", *um));
     return table;
   }
   if (!has_ctf_file(files)) return std::nullopt;
   io::CtfTable table = io::read_ctf(*files.ctf);
-  require_sections(table.views.size(), num_sections, table.file, "contrast transfer", stack);
+  match_sections(sections, table);
   for (const std::string& what : table.not_applied)
     base::log_warning(fmt::format("'{}' has {}, which is not applied", table.file.string(), what));
   base::log_info(fmt::format("ctf: the defocus of each view from '{}'; --ctf none turns it off",
@@ -67,16 +127,37 @@ std::optional<io::CtfTable> find_ctf(const SeriesFiles& files, const ViewOptions
   return table;
 }
 
-// Returns the optics: those of the options, else those of the file, else the usual ones.
-microscope::Optics find_optics(const ViewOptions& options, const std::optional<io::CtfTable>& ctf) {
+// Returns the voltage that an .mdoc states, if there is one.
+std::optional<double> voltage_of_mdoc(const SeriesFiles& files) {
+  return files.mdoc ? io::read_mdoc(*files.mdoc).voltage_kV : std::nullopt;
+}
+
+// Says so if two files state different voltages, one of which is that of the microscope.
+void warn_of_voltages(double used_kV, const io::CtfTable& ctf) {
+  constexpr double kSame_kV = 1.0;
+  if (!ctf.optics.voltage_kV || std::abs(*ctf.optics.voltage_kV - used_kV) <= kSame_kV) return;
+  base::log_warning(fmt::format(
+      "'{}' has the defocus for a voltage of {} kV, and {} kV count: give the right one with "
+      "--voltage",
+      ctf.file.string(), *ctf.optics.voltage_kV, used_kV));
+}
+
+// Returns the optics: those of the options, else those of the file, else the usual ones. The
+// voltage is also that of an .mdoc.
+microscope::Optics find_optics(const SeriesFiles& files, const ViewOptions& options,
+                               const std::optional<io::CtfTable>& ctf) {
   const io::StatedOptics stated = ctf ? ctf->optics : io::StatedOptics{};
   microscope::Optics optics;
   const auto choose = [](double& value, const std::optional<double>& given,
                          const std::optional<double>& in_file) {
     if (given || in_file) value = given ? *given : *in_file;
   };
-  choose(optics.voltage_kV, options.voltage_kV, stated.voltage_kV);
+  const std::optional<double> recorded_kV = voltage_of_mdoc(files);
+  choose(optics.voltage_kV, options.voltage_kV, recorded_kV ? recorded_kV : stated.voltage_kV);
+  if (!options.voltage_kV && recorded_kV)
+    base::log_info(fmt::format("voltage: {} kV from '{}'", *recorded_kV, files.mdoc->string()));
   if (!ctf) return microscope::without_phase_contrast(optics);
+  warn_of_voltages(optics.voltage_kV, *ctf);
   choose(optics.spherical_aberration_mm, options.spherical_aberration_mm,
          stated.spherical_aberration_mm);
   choose(optics.amplitude_contrast, options.amplitude_contrast, stated.amplitude_contrast);
@@ -85,9 +166,10 @@ microscope::Optics find_optics(const ViewOptions& options, const std::optional<i
 
 // What files say of the doses and of the order in which the sections were recorded.
 struct Recording {
-  std::string source;              // the name of the file; empty: no file tells
-  std::optional<Exposures> doses;  // [section]
-  std::vector<std::size_t> order;  // of sections
+  std::filesystem::path file;
+  std::optional<Exposures> doses;               // [row]
+  std::vector<std::size_t> order;               // of rows
+  std::vector<std::optional<double>> tilt_deg;  // [row]; empty: not in the file
 };
 
 // Returns the sections in the order of their exposures.
@@ -98,46 +180,84 @@ std::vector<std::size_t> order_of(const Exposures& exposures) {
   return order;
 }
 
-Recording find_recording(const SeriesFiles& files, const tilt_series::TiltSeriesOptions& input,
-                         std::int64_t num_sections, const std::string& stack) {
-  Recording found;
-  if (files.mdoc) {
-    const io::Mdoc mdoc = io::read_mdoc(*files.mdoc);
-    require_sections(mdoc.sections.size(), num_sections, *files.mdoc, "doses", stack);
-    return {files.mdoc->string(), microscope::exposures_of(mdoc), io::acquisition_order(mdoc)};
-  }
-  if (!input.images && io::is_view_table(files.stack)) {
-    found.doses = microscope::exposures_of(io::read_view_table(files.stack));
-    if (found.doses) {
-      require_sections(found.doses->size(), num_sections, files.stack, "doses", stack);
-      return {files.stack.string(), found.doses, order_of(*found.doses)};
+// Reads the doses of an .mdoc. With `of_view`, the order of recording alone counts.
+Recording recording_of_mdoc(const std::filesystem::path& path, bool of_view) {
+  const io::Mdoc mdoc = io::read_mdoc(path);
+  Recording found{path, {}, io::acquisition_order(mdoc).sections, {}};
+  for (const io::MdocSection& section : mdoc.sections) found.tilt_deg.push_back(section.tilt_deg);
+  if (of_view) {
+    if (microscope::contradicts_prior_doses(found.order, mdoc)) {
+      throw Error(fmt::format(
+          "'{}': PriorRecordDose is missing in some sections and contradicts the order of the "
+          "others, so --dose-per-tilt has no order of recording: complete PriorRecordDose or "
+          "DateTime, or leave --mdoc out if the stack is in that order",
+          path.string()));
     }
+    return found;
   }
-  found.order.resize(static_cast<std::size_t>(num_sections));
-  std::iota(found.order.begin(), found.order.end(), std::size_t{0});
+  microscope::MdocExposures doses = microscope::exposures_of(mdoc);
+  if (!doses.fault.empty()) {
+    base::log_warning(
+        fmt::format("'{}': {}, so its doses are not used (--dose-per-tilt gives a dose)",
+                    path.string(), doses.fault));
+  }
+  found.doses = std::move(doses.of_section);
   return found;
+}
+
+// Reads the doses and the order of recording of a list of tilts, if it has them.
+std::optional<Recording> recording_of_tilts(const std::filesystem::path& path) {
+  const io::TiltTable table = io::read_tilt_table(path);
+  if (table.order.empty()) return std::nullopt;
+  Recording found{path, {}, table.order, {}};
+  for (const io::NumberLine& angle : table.angles) found.tilt_deg.emplace_back(angle.value);
+  if (!table.doses.empty()) found.doses = microscope::exposures_in_order(table.order, table.doses);
+  return found;
+}
+
+std::optional<Recording> find_recording(const SeriesFiles& files, const Sections& sections,
+                                        bool of_view) {
+  if (files.mdoc) return recording_of_mdoc(*files.mdoc, of_view);
+  if (!sections.input.images && io::is_view_table(files.stack)) {
+    const auto doses = microscope::exposures_of(io::read_view_table(files.stack));
+    if (doses) return Recording{files.stack, doses, order_of(*doses), {}};
+  }
+  if (files.tlt) return recording_of_tilts(*files.tlt);
+  return std::nullopt;
 }
 
 // Returns the exposure of each section, or nothing if it is not known or not wanted.
 std::optional<Exposures> find_exposures(const SeriesFiles& files, const ViewOptions& options,
-                                        const tilt_series::TiltSeriesOptions& input,
-                                        std::int64_t num_sections, const std::string& stack) {
+                                        const Sections& sections) {
   const std::optional<double>& of_view = options.dose_per_tilt;
   if (options.is_dose_weighted) {
     base::log_info("dose: the views are weighted by it already, so no radiation damage is applied");
     return std::nullopt;
   }
   if (of_view && *of_view == 0.0) return std::nullopt;
-  const Recording recording = find_recording(files, input, num_sections, stack);
-  if (!of_view) {
-    if (recording.doses) base::log_info(fmt::format("dose: from '{}'", recording.source));
-    return recording.doses;
+  const auto recording = find_recording(files, sections, of_view.has_value());
+  if (!recording) {
+    if (!of_view) return std::nullopt;
+    base::log_info(fmt::format(
+        "dose: {} electrons per Å² a view, in the order of the stack's sections, because "
+        "no file has the order of recording",
+        *of_view));
+    std::vector<std::size_t> as_stacked(static_cast<std::size_t>(sections.count));
+    std::iota(as_stacked.begin(), as_stacked.end(), std::size_t{0});
+    return microscope::exposures_in_order(as_stacked, *of_view);
   }
-  base::log_info(fmt::format(
-      "dose: {} electrons per Å² a view, in the order of {}", *of_view,
-      recording.source.empty() ? "the stack's sections, because no file has the order of recording"
-                               : "'" + recording.source + "'"));
-  return microscope::exposures_in_order(recording.order, *of_view);
+  if (!of_view && !recording->doses) return std::nullopt;
+  base::log_info(of_view ? fmt::format("dose: {} electrons per Å² a view, in the order of '{}'",
+                                       *of_view, recording->file.string())
+                         : fmt::format("dose: from '{}'", recording->file.string()));
+  const Exposures of_row =
+      of_view ? microscope::exposures_in_order(recording->order, *of_view) : *recording->doses;
+  const auto rows = rows_of_sections(sections, of_row.size(), recording->tilt_deg, recording->file,
+                                     /*is_ctf=*/false);
+  Exposures of_section(static_cast<std::size_t>(sections.count));
+  for (std::size_t i = 0; i < of_section.size(); ++i)
+    if (rows[i]) of_section[i] = of_row[*rows[i]];
+  return of_section;
 }
 
 // Returns what the detector passes of the signal, or nothing if it is not known.
@@ -217,14 +337,13 @@ std::vector<microscope::ViewTransfer> view_transfers(const tilt_series::TiltSeri
         "ctf: none is given (--ctf or --defocus), so the views count as plain projections: "
         "a tomogram of them lacks contrast at low resolution and keeps the fringes of defocus");
   if (!wants_transfers(files, options)) return {};
-  const auto stack = tilt_series::open_views(input);
-  const std::int64_t num_sections = stack->header().nz;
-  require_pixel_size(input, series, stack->name());
-  const auto ctf = find_ctf(files, options, num_sections, stack->name());
-  const auto exposures = find_exposures(files, options, input, num_sections, stack->name());
+  const Sections sections = sections_of(input, series);
+  require_pixel_size(input, series, sections.stack);
+  const auto ctf = find_ctf(files, options, sections);
+  const auto exposures = find_exposures(files, options, sections);
   const auto detector = find_detector(files, series);
   if (!ctf && !exposures && !detector) return {};
-  const microscope::Optics optics = find_optics(options, ctf);
+  const microscope::Optics optics = find_optics(files, options, ctf);
   std::vector<microscope::ViewTransfer> transfers(series.views().size());
   for (std::size_t view = 0; view < transfers.size(); ++view) {
     microscope::ViewTransfer& transfer = transfers[view];

@@ -1,7 +1,11 @@
 #include "microscope/exposure.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <utility>
 
 namespace tomofield::microscope {
 namespace {
@@ -43,6 +47,49 @@ std::optional<std::vector<Exposure>> exposures_from(
   return exposures;
 }
 
+using Sections = std::vector<std::size_t>;  // counted from 1
+using Dose = std::optional<double> io::MdocSection::*;
+
+// Returns the sections that do not have a dose. SerialEM writes 0 for an ExposureDose that it does
+// not know; 0 before a section is a dose.
+Sections sections_without(const io::Mdoc& mdoc, Dose dose) {
+  Sections without;
+  for (std::size_t i = 0; i < mdoc.sections.size(); ++i) {
+    const std::optional<double>& value = mdoc.sections[i].*dose;
+    const bool may_be_zero = dose == &io::MdocSection::prior_dose;
+    if (!value || *value < 0.0 || (*value == 0.0 && !may_be_zero)) without.push_back(i + 1);
+  }
+  return without;
+}
+
+bool has_dose(const io::Mdoc& mdoc, Dose dose) {
+  return std::ranges::any_of(mdoc.sections, [&](const io::MdocSection& section) {
+    return (section.*dose).value_or(0.0) > 0.0;
+  });
+}
+
+std::string names_of(const Sections& sections) {
+  constexpr std::size_t kMostNames = 8;
+  const bool are_many = sections.size() > kMostNames;
+  return fmt::format("section{} {}{}", sections.size() == 1 ? "" : "s",
+                     fmt::join(sections.begin(),
+                               sections.begin() + static_cast<std::ptrdiff_t>(
+                                                      std::min(sections.size(), kMostNames)),
+                               ", "),
+                     are_many ? " …" : "");
+}
+
+// Tells whether exposures are those of the sections whose PriorRecordDose is known, within half a
+// view. A file in which it is 0 everywhere does not know it.
+bool agree(const std::vector<Exposure>& exposures, const io::Mdoc& mdoc) {
+  if (!has_dose(mdoc, &io::MdocSection::prior_dose)) return true;
+  for (std::size_t i = 0; i < exposures.size(); ++i) {
+    const std::optional<double>& prior = mdoc.sections[i].prior_dose;
+    if (prior && std::fabs(*prior - exposures[i].before) > exposures[i].of_view / 2) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 double critical_exposure(double k, double voltage_kV) {
@@ -60,27 +107,56 @@ std::vector<Exposure> exposures_in_order(std::span<const std::size_t> order, dou
   return exposures;
 }
 
-std::optional<std::vector<Exposure>> exposures_of(const io::Mdoc& mdoc) {
-  std::vector<std::optional<double>> before;
-  bool has_own = true;
-  for (const io::MdocSection& section : mdoc.sections) {
-    before.push_back(section.prior_dose);
-    has_own = has_own && section.dose.value_or(0.0) > 0.0;
-  }
-  std::optional<std::vector<Exposure>> exposures = exposures_from(before);
-  if (!has_own) return exposures;
-  if (exposures) {
-    for (std::size_t i = 0; i < exposures->size(); ++i)
-      (*exposures)[i].of_view = *mdoc.sections[i].dose;
-    return exposures;
-  }
-  exposures.emplace(mdoc.sections.size());
+std::vector<Exposure> exposures_in_order(std::span<const std::size_t> order,
+                                         std::span<const double> doses) {
+  std::vector<Exposure> exposures(order.size());
   double sum = 0.0;
-  for (const std::size_t i : io::acquisition_order(mdoc)) {
-    (*exposures)[i] = {sum, *mdoc.sections[i].dose};
-    sum += *mdoc.sections[i].dose;
+  for (const std::size_t i : order) {
+    exposures[i] = {sum, doses[i]};
+    sum += doses[i];
   }
   return exposures;
+}
+
+bool contradicts_prior_doses(std::span<const std::size_t> order, const io::Mdoc& mdoc) {
+  double last = 0.0;
+  for (const std::size_t i : order) {
+    const std::optional<double>& prior = mdoc.sections[i].prior_dose;
+    if (prior && *prior < last) return true;
+    last = prior.value_or(last);
+  }
+  return false;
+}
+
+MdocExposures exposures_of(const io::Mdoc& mdoc) {
+  const Sections no_prior = sections_without(mdoc, &io::MdocSection::prior_dose);
+  const Sections no_dose = sections_without(mdoc, &io::MdocSection::dose);
+  std::vector<std::optional<double>> before;
+  for (const io::MdocSection& section : mdoc.sections) before.push_back(section.prior_dose);
+  if (auto exposures = exposures_from(before)) {
+    for (std::size_t i = 0; no_dose.empty() && i < exposures->size(); ++i)
+      (*exposures)[i].of_view = *mdoc.sections[i].dose;
+    return {std::move(exposures), {}};
+  }
+  const bool has_some_prior = no_prior.size() < mdoc.sections.size();
+  if (no_dose.empty()) {
+    const io::AcquisitionOrder order = io::acquisition_order(mdoc);
+    std::vector<double> doses;
+    for (const io::MdocSection& section : mdoc.sections) doses.push_back(*section.dose);
+    std::vector<Exposure> exposures = exposures_in_order(order.sections, doses);
+    if (!has_some_prior || agree(exposures, mdoc)) return {std::move(exposures), {}};
+    if (order.is_stated)
+      return {std::nullopt, "ExposureDose and DateTime contradict PriorRecordDose"};
+    return {std::nullopt,
+            fmt::format("PriorRecordDose is missing in {}, and nothing else tells the "
+                        "order of recording",
+                        names_of(no_prior))};
+  }
+  if (has_some_prior && !no_prior.empty() && has_dose(mdoc, &io::MdocSection::prior_dose))
+    return {std::nullopt, fmt::format("PriorRecordDose is missing in {}", names_of(no_prior))};
+  if (has_dose(mdoc, &io::MdocSection::dose))
+    return {std::nullopt, fmt::format("ExposureDose is missing in {}", names_of(no_dose))};
+  return {};
 }
 
 std::optional<std::vector<Exposure>> exposures_of(const io::ViewTable& table) {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "io/tables/alignment_files.h"
@@ -33,11 +34,25 @@ struct Exposure {
 /// `of_view` electrons per Å².
 std::vector<Exposure> exposures_in_order(std::span<const std::size_t> order, double of_view);
 
-/// Returns the exposure of each section of an .mdoc: from PriorRecordDose if the sections have it
-/// and it is not 0 in all of them, else from ExposureDose and the order of acquisition
-/// (io::acquisition_order()). Returns nothing if it has neither: SerialEM writes 0 if it does not
-/// know the dose.
-std::optional<std::vector<Exposure>> exposures_of(const io::Mdoc& mdoc);
+/// Does the same with a dose for each view, by its index.
+std::vector<Exposure> exposures_in_order(std::span<const std::size_t> order,
+                                         std::span<const double> doses);
+
+/// The exposure of each section of an .mdoc, or why it is not known.
+struct MdocExposures {
+  std::optional<std::vector<Exposure>> of_section;
+  std::string
+      fault;  ///< a phrase that names what is missing; empty if the file has no doses at all
+};
+
+/// Returns the exposures from PriorRecordDose if all sections have it and it is not 0 in all of
+/// them, else from ExposureDose and the order of acquisition (io::acquisition_order()). They are
+/// not known if these contradict a PriorRecordDose that some sections have, or if some have no
+/// ExposureDose. SerialEM writes 0 if it does not know the dose.
+MdocExposures exposures_of(const io::Mdoc& mdoc);
+
+/// Returns true if an order of recording contradicts the PriorRecordDose of sections that have it.
+bool contradicts_prior_doses(std::span<const std::size_t> order, const io::Mdoc& mdoc);
 
 /// Returns the exposure of each view of a table of RELION or Warp, or nothing if it has none, or if
 /// it is 0 in all views. The exposure of a view itself is the smallest difference between two

@@ -49,7 +49,7 @@ std::string mdoc_text(const std::array<std::string, 3>& entries) {
 
 std::optional<std::vector<Exposure>> exposures_of_text(const std::array<std::string, 3>& entries) {
   const ScratchDirectory directory;
-  return exposures_of(io::read_mdoc(directory.write("a.mdoc", mdoc_text(entries))));
+  return exposures_of(io::read_mdoc(directory.write("a.mdoc", mdoc_text(entries)))).of_section;
 }
 
 TEST(ExposuresOfMdoc, AddUpTheDoses) {
@@ -83,6 +83,57 @@ TEST(ExposuresOfMdoc, AreUnknownIfSerialEmDoesNotKnowThem) {
                                   "ExposureDose = 0\nPriorRecordDose = 0",
                                   "ExposureDose = 0\nPriorRecordDose = 0"}));
   EXPECT_FALSE(exposures_of_text({"ExposureDose = 3", "ExposureDose = 3", ""}));
+}
+
+// Returns the exposures of an .mdoc of sections without times.
+MdocExposures without_times(const std::vector<std::string>& entries) {
+  const ScratchDirectory directory;
+  std::string text;
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    text += "[ZValue = " + std::to_string(i) + "]\n" + entries[i] + "\n";
+  return exposures_of(io::read_mdoc(directory.write("a.mdoc", text)));
+}
+
+TEST(ExposuresOfMdoc, NeverContradictAPriorDoseThatIsKnown) {
+  // The order by numbers is not that of recording.
+  const MdocExposures unordered =
+      without_times({"ExposureDose = 8", "ExposureDose = 8\nPriorRecordDose = 56",
+                     "ExposureDose = 8\nPriorRecordDose = 0", "ExposureDose = 8"});
+  EXPECT_FALSE(unordered.of_section);
+  EXPECT_EQ(unordered.fault,
+            "PriorRecordDose is missing in sections 1, 4, and nothing else tells the order of "
+            "recording");
+  // It is, and the prior doses agree with it.
+  const MdocExposures ordered = without_times(
+      {"ExposureDose = 2", "ExposureDose = 2\nPriorRecordDose = 2.1", "ExposureDose = 2"});
+  ASSERT_TRUE(ordered.of_section);
+  EXPECT_EQ((*ordered.of_section)[2].before, 4.0);
+  // Times tell an order that the prior doses contradict.
+  const MdocExposures timed =
+      without_times({"ExposureDose = 2\nDateTime = 12-Mar-21 10:00:00\nPriorRecordDose = 9",
+                     "ExposureDose = 2\nDateTime = 12-Mar-21 10:01:00"});
+  EXPECT_FALSE(timed.of_section);
+  EXPECT_NE(timed.fault.find("contradict"), std::string::npos);
+}
+
+TEST(ExposuresOfMdoc, SaysWhatIsMissing) {
+  const std::string dose = "ExposureDose = 3";
+  EXPECT_EQ(without_times({dose, "ExposureDose = 0", dose}).fault,
+            "ExposureDose is missing in section 2");
+  EXPECT_EQ(without_times({dose, "", "", "", "", "", "", "", "", ""}).fault,
+            "ExposureDose is missing in sections 2, 3, 4, 5, 6, 7, 8, 9 …");
+  EXPECT_EQ(without_times({"PriorRecordDose = 3", "", "PriorRecordDose = 0"}).fault,
+            "PriorRecordDose is missing in section 2");
+  EXPECT_EQ(without_times({"", ""}).fault, "");
+}
+
+TEST(ExposuresOfMdoc, AnOrderMayContradictThem) {
+  const ScratchDirectory directory;
+  const io::Mdoc mdoc = io::read_mdoc(directory.write(
+      "a.mdoc",
+      "[ZValue = 0]\nPriorRecordDose = 4\n[ZValue = 1]\n[ZValue = 2]\nPriorRecordDose = 0\n"));
+  EXPECT_TRUE(contradicts_prior_doses(std::vector<std::size_t>{0, 1, 2}, mdoc));
+  EXPECT_FALSE(contradicts_prior_doses(std::vector<std::size_t>{2, 1, 0}, mdoc));
 }
 
 TEST(ExposuresOfTable, AreThoseBeforeTheViews) {

@@ -26,9 +26,9 @@ void note_members(const Struct& of, const Note& note) {
     note_all(m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11);
   } else if constexpr (std::is_same_v<Struct, ViewOptions>) {
     const auto& [m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17,
-                 m18, m19, m20] = of;
+                 m18, m19, m20, m21] = of;
     note_all(m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17, m18,
-             m19, m20);
+             m19, m20, m21);
   } else if constexpr (std::is_same_v<Struct, SpecimenOptions>) {
     const auto& [m0, m1, m2, m3, m4, m5] = of;
     note_all(m0, m1, m2, m3, m4, m5);

@@ -120,7 +120,10 @@ class ModelReader {
 
   void require_known_format(const StoredGroup& root) const {
     if (!root.has_attribute("format") || root.text("format") != kFormat)
-      throw Error(fmt::format("'{}' is an HDF5 file, but no model of tomofield", path_));
+      throw Error(fmt::format(
+          "'{}' is an HDF5 file and no model of tomofield. A stack must be MRC or TIFF: convert it "
+          "with IMOD's newstack -format MRC or EMAN2's e2proc2d.py",
+          path_));
     const std::int64_t version = root.integer("format_version");
     if (version != kFormatVersion && version != kCompactVersion)
       throw Error(

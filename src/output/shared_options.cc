@@ -7,6 +7,7 @@ namespace tomofield::output {
 tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Options& options) {
   tilt_series::TiltSeriesOptions series{files, options.views};
   series.resample = options.fit.engine == Engine::kSlab;
+  series.starts_raw = options.run.align == Alignment::kFull;
   series.scratch_dir = io::scratch_directory(options.run.output);
   return series;
 }

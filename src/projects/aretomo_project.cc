@@ -1,10 +1,9 @@
 #include <fmt/format.h>
 
-#include <array>
-#include <system_error>
-
 #include "io/tables/alignment_files.h"
 #include "projects/formats.h"
+#include "projects/stack_beside.h"
+#include "projects/transfer_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::projects {
@@ -15,15 +14,9 @@ namespace {
 // Returns the stack beside an .aln file: AreTomo3 writes it under the same name, and AreTomo2
 // names the .aln file after it.
 fs::path find_stack(const fs::path& aln) {
-  constexpr std::array kExtensions{".mrc", ".st", ".mrcs", ".tif", ".tiff"};
-  for (const char* extension : kExtensions) {
-    fs::path stack = aln;
-    stack.replace_extension(extension);
-    std::error_code absent;
-    if (fs::exists(stack, absent)) return stack;
-  }
+  if (const auto stack = find_stack_beside(aln, {})) return *stack;
   fs::path expected = aln;
-  expected.replace_extension(kExtensions.front());
+  expected.replace_extension(".mrc");
   throw Error(fmt::format(
       "'{}' is AreTomo's alignment, and the stack that it aligns is not beside it as '{}': give "
       "the stack itself, with --aln {}",
@@ -34,9 +27,10 @@ fs::path find_stack(const fs::path& aln) {
 
 void read_aretomo_project(Project& project) {
   const fs::path aln = project.request().path;
-  const io::AreTomoAlignment alignment = io::read_aretomo_alignment(aln);
+  const io::AreTomoAlignment alignment = io::read_aretomo_alignment(aln, /*needs_tilt=*/false);
   project.set("stack", find_stack(aln).string(), aln, "RawSize");
   project.set("--aln", aln.string(), aln, "SEC");
+  set_transfer_files(project, aln.parent_path(), aln.stem().string());
   if (alignment.thickness)
     project.set("--thickness", fmt::format("{}", *alignment.thickness), aln, "Thickness");
   if (alignment.alpha_offset_deg != 0) {

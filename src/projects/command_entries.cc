@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <utility>
 
+#include "io/named_file.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
@@ -38,6 +40,21 @@ io::Command find_command(const fs::path& file, std::string_view program) {
                     file.string(), found.front().line, program));
   }
   return std::move(found.front());
+}
+
+// Splits a list of IMOD: values between commas or white space. Nothing between two commas stands
+// for a default value, and a slash ends the list.
+std::vector<std::optional<std::string_view>> split_list(std::string_view text) {
+  text = text.substr(0, text.find('/'));
+  std::vector<std::optional<std::string_view>> values;
+  while (!text.empty()) {
+    const std::size_t comma = std::min(text.find(','), text.size());
+    const auto words = io::split_words(text.substr(0, comma));
+    values.insert(values.end(), words.begin(), words.end());
+    if (words.empty() && comma < text.size()) values.emplace_back();
+    text.remove_prefix(std::min(comma + 1, text.size()));
+  }
+  return values;
 }
 
 }  // namespace
@@ -77,21 +94,30 @@ std::optional<std::string> CommandEntries::text(std::string_view name) {
 std::optional<fs::path> CommandEntries::path(std::string_view name) {
   const auto value = text(name);
   if (!value) return std::nullopt;
-  return file_.parent_path() / *value;
+  const fs::path folder = file_.parent_path();
+  const std::array places{folder, folder / ".."};
+  auto found = io::find_named_file(*value, places);
+  if (!found) found = io::find_named_file(io::without_folders(*value), places);
+  return found.value_or(folder / *value);
 }
 
 std::optional<std::vector<double>> CommandEntries::numbers(std::string_view name,
-                                                           std::size_t fewest, std::size_t most) {
+                                                           std::size_t fewest, std::size_t most,
+                                                           std::span<const double> defaults) {
   const io::CommandEntry* entry = find(name);
   if (entry == nullptr) return std::nullopt;
-  std::string list = entry->value;
-  std::ranges::replace(list, ',', ' ');
-  std::vector<double> values;
-  for (const std::string_view word : io::split_words(list)) {
-    const auto value = io::parse_number(word, base::kLargestPosition_px);
+  const auto words = split_list(entry->value);
+  if (std::ranges::none_of(words, [](const auto& word) { return word.has_value(); }))
+    return std::nullopt;
+  std::vector<double> values(defaults.begin(), defaults.end());
+  values.resize(std::max(values.size(), words.size()));
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (!words[i] && i < defaults.size()) continue;
+    const auto value =
+        words[i] ? io::parse_number(*words[i], base::kLargestPosition_px) : std::nullopt;
     if (!value)
       fail(*entry, fmt::format("a number from -{0:g} to {0:g}", base::kLargestPosition_px));
-    values.push_back(*value);
+    values[i] = *value;
   }
   if (values.size() < fewest || values.size() > most) {
     fail(*entry, fewest == most ? fmt::format("an entry of {} numbers", most)
@@ -114,11 +140,10 @@ std::vector<std::string> CommandEntries::texts(std::string_view name) {
   return values;
 }
 
-void CommandEntries::refuse(std::string_view name, std::string_view why) {
+std::optional<std::string> CommandEntries::fault_of(std::string_view name, std::string_view why) {
   const io::CommandEntry* entry = find(name);
-  if (entry == nullptr) return;
-  throw Error(fmt::format("'{}', line {}: {} {}; --ignore {} goes on without it", file_.string(),
-                          entry->line, entry->name, why, name));
+  if (entry == nullptr) return std::nullopt;
+  return fmt::format("line {}: {} {}", entry->line, entry->name, why);
 }
 
 void CommandEntries::know(std::span<const std::string_view> names) {

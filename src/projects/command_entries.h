@@ -28,18 +28,24 @@ class CommandEntries {
   bool has(std::string_view name) { return find(name) != nullptr; }
   /// Returns the text of an entry. Throws Error if it comes twice or is empty.
   std::optional<std::string> text(std::string_view name);
-  /// Returns the file that an entry names, from the folder of the command file.
+  /// Returns the file that an entry names (io/named_file.h): where the entry says, from the folder
+  /// of the command file, or else beside the command file or above it, where it lies if the folder
+  /// was moved. Where there is none, returns the first of these places.
   std::optional<std::filesystem::path> path(std::string_view name);
   /// Returns the numbers of an entry, which has from `fewest` to `most` of them, finite and
-  /// plausible. Throws Error otherwise.
+  /// plausible. As in IMOD, nothing between two commas stands for a default value, and so does a
+  /// slash for those that follow: these are taken from `defaults`. Returns nothing for an entry of
+  /// defaults alone, or without a value. Throws Error otherwise.
   std::optional<std::vector<double>> numbers(std::string_view name, std::size_t fewest,
-                                             std::size_t most);
+                                             std::size_t most,
+                                             std::span<const double> defaults = {});
   std::optional<double> number(std::string_view name);
   /// Returns the texts of an entry that may come several times.
   std::vector<std::string> texts(std::string_view name);
 
-  /// Throws Error, which says how to go on, if there is such an entry.
-  void refuse(std::string_view name, std::string_view why);
+  /// Returns what is wrong with an entry that cannot be honoured, or nothing without such an entry:
+  /// "line 8: LOCALFILE aligns parts of the views".
+  std::optional<std::string> fault_of(std::string_view name, std::string_view why);
   /// Notes entries that make no difference to this program's result.
   void know(std::span<const std::string_view> names);
   /// Warns of each entry that nobody has asked for, by its name.

@@ -31,11 +31,16 @@ constexpr Format kFormats[] = {
      .extension = ".xml",
      .is_main_file = [](std::string_view) { return false; },  // frames have XML files too
      .read = read_warp_project},
+    {.name = "eTomo's dataset (.edf)",
+     .extension = ".edf",
+     .is_main_file = [](std::string_view name) { return name.ends_with(".edf"); },
+     .read = read_edf_project,
+     .rank = 1},
     {.name = "SerialEM's metadata (.mdoc)",
      .extension = ".mdoc",
      .is_main_file = [](std::string_view name) { return name.ends_with(".mdoc"); },
      .read = read_mdoc_project,
-     .is_metadata = true},
+     .rank = 2},
 };
 
 }  // namespace

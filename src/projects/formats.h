@@ -9,6 +9,12 @@ namespace tomofield::projects {
 /// Reads eTomo's tilt.com and the newst.com beside it. Sets the raw stack and its transforms, or
 /// the aligned stack, and what the reconstruction needs.
 void read_imod_project(Project& project);
+/// Does the same for a tilt.com beside the file of the request.
+void read_imod_project(Project& project, const std::filesystem::path& tilt_com);
+
+/// Reads eTomo's .edf: the tilt.com in its folder, or, where there is none yet, the files that
+/// eTomo names after the dataset.
+void read_edf_project(Project& project);
 
 /// Reads AreTomo's .aln. The stack lies beside it.
 void read_aretomo_project(Project& project);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -48,17 +49,11 @@ struct NamedFile {
   std::string entry;
 };
 
-// Returns the file where the entry says that it is, or beside the command file or above it, where
-// it lies if the folder was moved. Nothing if it is in none of these places.
+// Returns the file that an entry names, if it is there.
 std::optional<NamedFile> find_file(CommandEntries& entries, std::string_view name) {
   const auto path = entries.path(name);
-  if (!path) return std::nullopt;
-  const fs::path folder = entries.file().parent_path();
-  for (const fs::path& place :
-       {*path, folder / path->filename(), folder / ".." / path->filename()}) {
-    if (is_file(place)) return NamedFile{place, entries.file(), std::string(name)};
-  }
-  return std::nullopt;
+  if (!path || !is_file(*path)) return std::nullopt;
+  return NamedFile{*path, entries.file(), std::string(name)};
 }
 
 // A raw stack and its transforms.
@@ -82,14 +77,29 @@ bool is_montage(const fs::path& tilt) {
   return is_file(tilt.parent_path() / name) && name != tilt.filename().string();
 }
 
-// Finds the raw files by eTomo's names: NAME.st or NAME.mrc, and NAME.xf, for NAME_ali.mrc or
-// NAME.ali.
+// Returns eTomo's name of a dataset by that of its aligned stack: NAME_ali.mrc or NAME.ali.
+std::string series_name_of(CommandEntries& tilt) {
+  const auto aligned = tilt.path("InputProjections");
+  std::string name = aligned ? aligned->filename().string() : std::string();
+  for (const std::string_view end : {"_ali.mrc", ".ali"})
+    if (name.ends_with(end)) name.erase(name.size() - end.size());
+  return name;
+}
+
+// Tells whether the labels of a stack say that a program has made it, by its name in lower case.
+bool went_through(const io::MrcHeader& header, std::string_view program) {
+  return std::ranges::any_of(header.labels, [&](std::string label) {
+    std::ranges::transform(label, label.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return label.find(program) != std::string::npos;
+  });
+}
+
+// Finds the raw files by eTomo's names: NAME.st or NAME.mrc, and NAME.xf.
 std::optional<RawFiles> usual_raw_files(Project& project, CommandEntries& tilt) {
   const auto aligned = tilt.path("InputProjections");
   if (!aligned || project.ignores("TransformFile") || is_montage(tilt.file())) return std::nullopt;
-  std::string name = aligned->filename().string();
-  for (const std::string_view end : {"_ali.mrc", ".ali"})
-    if (name.ends_with(end)) name.erase(name.size() - end.size());
+  const std::string name = series_name_of(tilt);
   const fs::path folder = aligned->parent_path();
   const fs::path xf = folder / (name + ".xf");
   if (!is_file(xf)) return std::nullopt;
@@ -114,16 +124,12 @@ std::string_view what_hinders_raw(CommandEntries* newst) {
 // Warns if the aligned stack has corrections that the raw one does not have.
 void warn_of_corrections(Project& project, const fs::path& aligned) {
   const auto stack = io::open_image_stack(aligned);
-  for (std::string label : stack->header().labels) {
-    std::ranges::transform(label, label.begin(),
-                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    for (const std::string_view program : kCorrections) {
-      if (label.find(program) == std::string::npos) continue;
-      project.warn(fmt::format(
-          "the aligned stack '{}' went through {}, which the raw stack that is read did not: "
-          "--ignore TransformFile reads the aligned stack",
-          aligned.string(), program));
-    }
+  for (const std::string_view program : kCorrections) {
+    if (!went_through(stack->header(), program)) continue;
+    project.warn(fmt::format(
+        "the aligned stack '{}' went through {}, which the raw stack that is read did not: "
+        "--ignore TransformFile reads the aligned stack",
+        aligned.string(), program));
   }
 }
 
@@ -147,16 +153,46 @@ double find_bin(Project& project, CommandEntries& tilt, CommandEntries* newst, b
   return bin;
 }
 
-// Fills in how the aligned stack that newst.com makes lies over the views.
-void place_aligned_stack(CommandEntries& newst, ImodImages& images) {
-  if (const auto size = newst.numbers("SizeToOutputInXandY", 2, 2)) {
-    images.imod_width = size->at(0) * images.bin;
-    images.imod_height = size->at(1) * images.bin;
-  }
-  if (const auto offset = newst.numbers("OffsetsInXandY", 2, 2)) {
+// Fills in how the aligned stack that newst.com makes of a raw one lies over the views. Without a
+// size, newstack makes it as large as the raw stack.
+void place_aligned_stack(CommandEntries& newst, const io::MrcHeader& raw, ImodImages& images) {
+  const std::array raw_size{std::floor(static_cast<double>(raw.nx) / images.bin),
+                            std::floor(static_cast<double>(raw.ny) / images.bin)};
+  const auto size = newst.numbers("SizeToOutputInXandY", 2, 2, raw_size);
+  images.imod_width = (size ? size->at(0) : raw_size[0]) * images.bin;
+  images.imod_height = (size ? size->at(1) : raw_size[1]) * images.bin;
+  images.size_entry = size ? "SizeToOutputInXandY" : "the size of the raw stack";
+  if (const auto offset = newst.numbers("OffsetsInXandY", 2, 2, std::array{0.0, 0.0})) {
     images.imod_offset_x = offset->at(0);
     images.imod_offset_y = offset->at(1);
   }
+}
+
+// Does the same without newst.com. FULLIMAGE is the size of the aligned stack, or, with
+// SUBSETSTART, that of the whole views of which it is a part. Then its own size is known if it is
+// there.
+void place_aligned_part(CommandEntries& tilt, ImodImages& images) {
+  const auto full = tilt.numbers("FULLIMAGE", 2, 2);
+  if (!full || !(full->at(0) > 0 && full->at(1) > 0)) return;
+  images.size_entry = "FULLIMAGE";
+  images.imod_width = full->at(0);
+  images.imod_height = full->at(1);
+  const auto start = tilt.numbers("SUBSETSTART", 2, 2, std::array{0.0, 0.0});
+  if (!start || (start->at(0) == 0 && start->at(1) == 0)) return;
+  const auto aligned = find_file(tilt, "InputProjections");
+  if (!aligned) {
+    throw Error(fmt::format(
+        "'{}' has SUBSETSTART, and neither newst.com nor the aligned stack is there to tell which "
+        "part of the views it means: put one of them beside it, or reconstruct whole views with "
+        "--ignore SUBSETSTART",
+        tilt.file().string()));
+  }
+  const auto stack = io::open_image_stack(aligned->path);
+  images.size_entry = "FULLIMAGE, SUBSETSTART";
+  images.imod_width = static_cast<double>(stack->header().nx) * images.bin;
+  images.imod_height = static_cast<double>(stack->header().ny) * images.bin;
+  images.imod_offset_x = start->at(0) + images.imod_width / 2 - full->at(0) / 2;
+  images.imod_offset_y = start->at(1) + images.imod_height / 2 - full->at(1) / 2;
 }
 
 ImodImages read_raw(Project& project, const RawFiles& raw, CommandEntries& tilt,
@@ -169,10 +205,15 @@ ImodImages read_raw(Project& project, const RawFiles& raw, CommandEntries& tilt,
   images.stack = raw.stack.path;
   images.num_sections = stack->header().nz;
   images.is_raw = true;
+  images.series_name = series_name_of(tilt);
   images.bin = find_bin(project, tilt, newst, true);
+  images.has_newst = newst != nullptr;
   images.width = images.imod_width = static_cast<double>(size[0]);
   images.height = images.imod_height = static_cast<double>(size[1]);
-  if (newst != nullptr) place_aligned_stack(*newst, images);
+  if (newst != nullptr)
+    place_aligned_stack(*newst, stack->header(), images);
+  else
+    place_aligned_part(tilt, images);
   if (const auto aligned = find_file(tilt, "InputProjections"))
     warn_of_corrections(project, aligned->path);
   return images;
@@ -185,6 +226,8 @@ ImodImages read_aligned(Project& project, const NamedFile& aligned, CommandEntri
   ImodImages images;
   images.stack = aligned.path;
   images.num_sections = stack->header().nz;
+  images.series_name = series_name_of(tilt);
+  images.is_phase_flipped = went_through(stack->header(), "ctfphaseflip");
   images.bin = images.unit = find_bin(project, tilt, newst, false);
   images.width = images.imod_width = static_cast<double>(stack->header().nx) * images.unit;
   images.height = images.imod_height = static_cast<double>(stack->header().ny) * images.unit;

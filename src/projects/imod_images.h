@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "projects/command_entries.h"
 
@@ -18,6 +19,11 @@ struct ImodImages {
   double width = 0, height = 0;  ///< of the aligned views as this program makes them
   double imod_width = 0, imod_height = 0;       ///< of the aligned stack
   double imod_offset_x = 0, imod_offset_y = 0;  ///< its centre, from that of the views
+  bool has_newst = false;
+  bool is_phase_flipped = false;  ///< the stack went through ctfphaseflip, as its labels say
+  std::string series_name;        ///< eTomo's name of the dataset: "TS_01" of "TS_01_ali.mrc"
+  std::string
+      size_entry;  ///< what the size of the aligned stack follows from; empty: from its file
 };
 
 /// Chooses the images: the raw stack and its transforms if both are there, as newst.com names them

@@ -15,6 +15,7 @@
 #include "projects/formats.h"
 #include "projects/imod_images.h"
 #include "projects/imod_volume.h"
+#include "projects/transfer_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::projects {
@@ -89,19 +90,7 @@ std::optional<fs::path> find_newst(const fs::path& tilt) {
   return newst;
 }
 
-void refuse_what_is_missing(Project& project, CommandEntries& tilt, CommandEntries* newst) {
-  for (const Refusal& refusal : kRefusals) tilt.refuse(refusal.entry, refusal.why);
-  const auto local = tilt.text("LOCALFILE");
-  const auto global = newst == nullptr ? std::nullopt : newst->text("TransformFile");
-  if (local && local == global) {
-    project.warn(
-        fmt::format("'{}': LOCALFILE names the transforms of the whole views, as AreTomo "
-                    "writes it; they are applied once",
-                    tilt.file().string()));
-  } else {
-    tilt.refuse("LOCALFILE",
-                "aligns parts of the views by themselves, which this program cannot do");
-  }
+void warn_of_what_differs(Project& project, CommandEntries& tilt) {
   if (tilt.has("PARALLEL")) {
     project.warn(
         fmt::format("'{}': PARALLEL mirrors the volume, and this program does not (--axes "
@@ -114,6 +103,39 @@ void refuse_what_is_missing(Project& project, CommandEntries& tilt, CommandEntri
   }
 }
 
+// Refuses all entries at once without which the reconstruction is another one.
+void refuse_what_is_missing(Project& project, CommandEntries& tilt, CommandEntries* newst) {
+  std::vector<std::string> faults;
+  std::vector<std::string_view> entries;
+  const auto refuse = [&](std::string_view entry, std::string_view why) {
+    const auto fault = tilt.fault_of(entry, why);
+    if (!fault) return;
+    faults.push_back(*fault);
+    entries.push_back(entry);
+  };
+  for (const Refusal& refusal : kRefusals) refuse(refusal.entry, refusal.why);
+  const auto local = tilt.text("LOCALFILE");
+  const auto global = newst == nullptr ? std::nullopt : newst->text("TransformFile");
+  if (local && local == global) {
+    project.warn(
+        fmt::format("'{}': LOCALFILE names the transforms of the whole views, as AreTomo "
+                    "writes it; they are applied once",
+                    tilt.file().string()));
+  } else {
+    refuse("LOCALFILE", "aligns parts of the views by themselves, which this program cannot do");
+  }
+  if (const auto xtilt = tilt.path("XTILTFILE"); xtilt && !io::is_file(*xtilt)) {
+    refuse("XTILTFILE",
+           fmt::format("names the x-axis tilts '{}', which are not there", xtilt->string()));
+  }
+  if (!faults.empty()) {
+    throw Error(fmt::format("'{}', {}; --ignore {} goes on without {}", tilt.file().string(),
+                            fmt::join(faults, "; "), fmt::join(entries, ","),
+                            faults.size() == 1 ? "it" : "them"));
+  }
+  warn_of_what_differs(project, tilt);
+}
+
 void set_angles(Project& project, CommandEntries& tilt) {
   for (const char* name : {"TILTFILE", "AngleFile"}) {
     if (const auto tlt = tilt.path(name)) {
@@ -121,13 +143,8 @@ void set_angles(Project& project, CommandEntries& tilt) {
       break;
     }
   }
-  if (const auto xtilt = tilt.path("XTILTFILE")) {
-    if (!io::is_file(*xtilt)) {
-      tilt.refuse("XTILTFILE",
-                  fmt::format("names the x-axis tilts '{}', which are not there", xtilt->string()));
-    }
+  if (const auto xtilt = tilt.path("XTILTFILE"))
     project.set("--xtilt", xtilt->string(), tilt.file(), "XTILTFILE");
-  }
   const auto x_axis_tilt = tilt.number("XAXISTILT");
   if (x_axis_tilt.value_or(0) != 0)
     project.set("--x-axis-tilt", fmt::format("{}", *x_axis_tilt), tilt.file(), "XAXISTILT");
@@ -178,8 +195,10 @@ void set_intensities(Project& project, CommandEntries& tilt) {
 
 }  // namespace
 
-void read_imod_project(Project& project) {
-  CommandEntries tilt(project, project.request().path, "tilt");
+void read_imod_project(Project& project) { read_imod_project(project, project.request().path); }
+
+void read_imod_project(Project& project, const fs::path& tilt_com) {
+  CommandEntries tilt(project, tilt_com, "tilt");
   std::optional<CommandEntries> newst_com;
   if (const auto path = find_newst(tilt.file())) newst_com.emplace(project, *path, "newstack");
   CommandEntries* newst = newst_com ? &*newst_com : nullptr;
@@ -189,6 +208,11 @@ void read_imod_project(Project& project) {
   set_imod_volume(project, tilt, images);
   set_excluded(project, tilt, images.num_sections);
   set_intensities(project, tilt);
+  const bool has_defocus =
+      set_transfer_files(project, tilt.file().parent_path(), images.series_name);
+  if (has_defocus && images.is_phase_flipped)
+    project.set("--ctf-phase-flipped", "true", images.stack, "ctfphaseflip");
+  set_imod_optics(project, tilt.file(), has_defocus || project.request().has_transfer);
   tilt.know(kHarmless);
   tilt.warn_about_others();
   if (newst != nullptr) newst->warn_about_others();

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -54,10 +55,10 @@ void set_roi(Project& project, CommandEntries& tilt, const ImodImages& images, d
   const double left = images.width / 2 + images.imod_offset_x - images.imod_width / 2;
   const double bottom = images.height / 2 + images.imod_offset_y - images.imod_height / 2;
   if (images.imod_width != images.width || images.imod_height != images.height)
-    entries.emplace_back("SizeToOutputInXandY");
-  if (images.imod_offset_x != 0 || images.imod_offset_y != 0)
+    entries.push_back(images.size_entry);
+  if (images.has_newst && (images.imod_offset_x != 0 || images.imod_offset_y != 0))
     entries.emplace_back("OffsetsInXandY");
-  const bool is_of_newst = !entries.empty();
+  const bool is_of_newst = images.has_newst && !entries.empty();
   Side x{left - shift_x, left - shift_x + images.imod_width};
   Side y{bottom, bottom + images.imod_height};
   if (shift_x != 0) entries.emplace_back("SHIFT");
@@ -87,7 +88,7 @@ void set_roi(Project& project, CommandEntries& tilt, const ImodImages& images, d
 void set_center(Project& project, CommandEntries& tilt, const ImodImages& images,
                 double axis_offset) {
   const auto full = tilt.numbers("FULLIMAGE", 2, 2);
-  const auto start = tilt.numbers("SUBSETSTART", 2, 2);
+  const auto start = tilt.numbers("SUBSETSTART", 2, 2, std::array{0.0, 0.0});
   if (start && !full && (start->at(0) != 0 || start->at(1) != 0)) {
     throw Error(
         fmt::format("'{}' has SUBSETSTART without FULLIMAGE, so the tilt axis cannot be "
@@ -120,14 +121,15 @@ void set_center(Project& project, CommandEntries& tilt, const ImodImages& images
 }  // namespace
 
 void set_imod_volume(Project& project, CommandEntries& tilt, const ImodImages& images) {
+  constexpr std::array kNoShift{0.0};
   if (const auto thickness = tilt.number("THICKNESS"))
     project.set("--thickness", text_of(*thickness / images.unit), tilt.file(), "THICKNESS");
-  const auto shift = tilt.numbers("SHIFT", 1, 2).value_or(std::vector<double>{0});
+  const auto shift = tilt.numbers("SHIFT", 1, 2, kNoShift).value_or(std::vector<double>{0});
   // Rows of IMOD's slices go down along Z (docs/geometry.md).
   if (shift.size() > 1 && shift[1] != 0)
     project.set("--shift-z", text_of(-shift[1] / images.unit), tilt.file(), "SHIFT");
   set_roi(project, tilt, images, shift[0]);
-  const auto offset = tilt.numbers("OFFSET", 1, 2).value_or(std::vector<double>{0});
+  const auto offset = tilt.numbers("OFFSET", 1, 2, kNoShift).value_or(std::vector<double>{0});
   if (offset[0] != 0) project.set("--tilt-offset", text_of(offset[0]), tilt.file(), "OFFSET");
   set_center(project, tilt, images, offset.size() > 1 ? offset[1] : 0.0);
 }

@@ -23,16 +23,15 @@ struct MainFile {
   fs::path path;
 };
 
-// Returns the main files of a folder, sorted by name; with `metadata`, those of formats that are
-// metadata, else those of the others.
-std::vector<MainFile> main_files(const fs::path& folder, bool metadata) {
+// Returns the main files of a folder of formats of a rank, sorted by name.
+std::vector<MainFile> main_files(const fs::path& folder, int rank) {
   std::vector<MainFile> found;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     std::error_code absent;
     if (!entry.is_regular_file(absent)) continue;
     const std::string name = entry.path().filename().string();
     for (const Format& format : all_formats()) {
-      if (format.is_metadata == metadata && format.is_main_file(name))
+      if (format.rank == rank && format.is_main_file(name))
         found.push_back({&format, entry.path()});
     }
   }
@@ -49,9 +48,10 @@ std::string names_of_formats() {
 // Returns the one main file of a folder, or none if the folder may be one of images. Throws Error
 // if there is none, or more than one.
 MainFile find_main_file(const fs::path& folder, bool may_have_images) {
-  std::vector<MainFile> found = main_files(folder, false);
+  std::vector<MainFile> found = main_files(folder, 0);
   if (found.empty() && may_have_images) return {};
-  if (found.empty()) found = main_files(folder, true);
+  constexpr int kLastRank = 2;
+  for (int rank = 1; found.empty() && rank <= kLastRank; ++rank) found = main_files(folder, rank);
   if (found.empty()) {
     throw Error(fmt::format("the folder '{}' has no project that can be read ({}): name a file",
                             folder.string(), names_of_formats()));

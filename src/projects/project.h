@@ -16,7 +16,8 @@ struct Request {
   std::filesystem::path path = {};
   std::vector<std::string> ignored = {};  ///< names of entries that are not applied (--ignore)
   std::string series = {};                ///< of a project that has several (--series); empty: all
-  bool has_mdoc = false;  ///< the user gave --mdoc, so a folder may be that of its images
+  bool has_mdoc = false;      ///< the user gave --mdoc, so a folder may be that of its images
+  bool has_transfer = false;  ///< the user gave a contrast transfer, which optics describe
 };
 
 /// The files of another program as settings of this one, each with its origin.
@@ -65,8 +66,9 @@ struct Format {
   /// Reads the main file `project.request().path` and what lies beside it, and sets options. Throws
   /// Error if they cannot be honoured.
   void (*read)(Project& project);
-  /// Metadata beside a series: a folder is read by it only if it has no other project.
-  bool is_metadata = false;
+  /// A folder is read by the main files of the lowest rank that it has: files that say how a series
+  /// is aligned come before those that only accompany it.
+  int rank = 0;
 };
 
 /// Returns all kinds of projects.

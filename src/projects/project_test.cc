@@ -156,11 +156,17 @@ TEST(ImodProject, SizesAndOffsetsBecomeARegion) {
   EXPECT_EQ(roi("SizeToOutputInXandY 31,20\n", ""), "none");  // one pixel beyond, by rounding
   EXPECT_EQ(roi("SizeToOutputInXandY 20,10\n", ""), "10,10,50,30");
   EXPECT_EQ(roi("SizeToOutputInXandY 20,10\nOffsetsInXandY 6,-4\n", ""), "16,6,56,26");
-  EXPECT_EQ(roi("", "WIDTH 40\n"), "10,0,50,40");
-  EXPECT_EQ(roi("", "WIDTH 40\nSHIFT 8 0\n"), "2,0,42,40");  // the volume shows what lies left
-  EXPECT_EQ(roi("", "SLICE 4 19\n"), "0,4,60,20");
+  const std::string whole = "SizeToOutputInXandY 30,20\n";
+  EXPECT_EQ(roi(whole, "WIDTH 40\n"), "10,0,50,40");
+  EXPECT_EQ(roi(whole, "WIDTH 40\nSHIFT 8 0\n"), "2,0,42,40");  // the volume shows what lies left
+  EXPECT_EQ(roi(whole, "SLICE 4 19\n"), "0,4,60,20");
   EXPECT_EQ(roi("SizeToOutputInXandY 20,10\n", "WIDTH 20\nSLICE 2 5\n"), "20,12,40,16");
-  expect_parts(imod.warnings(), {""});
+  // Without a size the aligned stack has that of the raw one, whose sides are exchanged.
+  for (const char* size :
+       {"", "SizeToOutputInXandY ,,\n", "SizeToOutputInXandY 20,/\n", "SizeToOutputInXandY /\n"})
+    EXPECT_EQ(roi(size, ""), "10,0,50,40") << size;
+  expect_parts(imod.warnings(), {"the size of the raw stack", "beyond"});
+  imod.write_newst("BinByFactor 2\n" + whole);
   imod.write_tilt("IMAGEBINNED 2\nSHIFT 90 0\n");
   expect_parts(imod.refusal(), {"tilt.com", "SHIFT", "no part"});
   imod.write_tilt("IMAGEBINNED 2\nSHIFT 20 0\n");
@@ -176,7 +182,10 @@ TEST(ImodProject, TheTiltAxisIsWhereTheSubsetHasIt) {
     const auto found = values.find("--center");
     return found == values.end() ? "none" : found->second;
   };
-  EXPECT_EQ(center("", "FULLIMAGE 60 40\nSUBSETSTART 0 0\n"), "none");
+  const std::string whole = "SizeToOutputInXandY 30,20\n";
+  EXPECT_EQ(center(whole, "FULLIMAGE 60 40\nSUBSETSTART 0 0\n"), "none");
+  EXPECT_EQ(center("", "FULLIMAGE 40 60\nSUBSETSTART 0 0\n"), "none");
+  EXPECT_EQ(center("", "FULLIMAGE\nSUBSETSTART /\n"), "none");
   // An aligned stack that is larger or smaller than the images, about the same centre.
   EXPECT_EQ(center("SizeToOutputInXandY 31,20\n", "FULLIMAGE 60 40\nSUBSETSTART -1 0\n"), "none");
   EXPECT_EQ(center("SizeToOutputInXandY 20,20\n", "FULLIMAGE 60 40\nSUBSETSTART 10 0\n"), "none");
@@ -188,7 +197,8 @@ TEST(ImodProject, TheTiltAxisIsWhereTheSubsetHasIt) {
   // The entries of tilt.com put the axis elsewhere.
   EXPECT_EQ(center("SizeToOutputInXandY 20,20\n", "FULLIMAGE 60 40\nSUBSETSTART 4 0\n"), "36");
   EXPECT_EQ(center("SizeToOutputInXandY 20,20\n", "FULLIMAGE 60 40\n"), "40");  // from 0 on
-  EXPECT_EQ(center("", "OFFSET 0 -7\n"), "23");
+  EXPECT_EQ(center(whole, "OFFSET 0 -7\n"), "23");
+  EXPECT_EQ(center(whole, "OFFSET ,-7\n"), "23");
   imod.write_tilt("IMAGEBINNED 2\nFULLIMAGE 60 40\nSUBSETSTART 0 6\nXAXISTILT 2\n");
   expect_parts(imod.warnings(), {"SUBSETSTART", "-6 unbinned"});
   imod.write_tilt("IMAGEBINNED 2\nSUBSETSTART 4 0\n");
@@ -211,9 +221,9 @@ TEST(ImodProject, WhatCannotBeHonouredIsRefusedOrSaid) {
   imod.write_newst("FloatDensities 2\n");
   expect_parts(imod.warnings({"WOBBLE"}), {"newst.com", "FloatDensities"});
   for (const std::string bad :
-       {"THICKNESS thick\n", "THICKNESS nan\n", "THICKNESS 1 2\n", "THICKNESS\n",
-        "THICKNESS 1e30\n", "SHIFT 1 2 3\n", "EXCLUDELIST2 0\n", "EXCLUDELIST2 2,6\n",
-        "IMAGEBINNED 0\n", "THICKNESS 2\nTHICKNESS 2\n", "INCLUDE 1\nEXCLUDELIST 2\n"}) {
+       {"THICKNESS thick\n", "THICKNESS nan\n", "THICKNESS 1 2\n", "THICKNESS 1e30\n",
+        "SHIFT 1 2 3\n", "EXCLUDELIST2 0\n", "EXCLUDELIST2 2,6\n", "IMAGEBINNED 0\n",
+        "THICKNESS 2\nTHICKNESS 2\n", "INCLUDE 1\nEXCLUDELIST 2\n"}) {
     imod.write_tilt(bad);
     EXPECT_NE(imod.refusal(), "") << bad;
   }
@@ -394,7 +404,10 @@ TEST(MdocProject, FindsTheStackOrTheImages) {
   write_stack(folder / "other.st", 16, 12, 1, some_value);
   EXPECT_EQ(stack().value, (folder / "other.st").string());
   write_stack(folder / "TS.mrc", 16, 12, 1, some_value);
+  EXPECT_EQ(stack().value, (folder / "other.st").string());
+  std::filesystem::rename(folder / "other.st", folder / "another.st");
   EXPECT_EQ(stack().value, (folder / "TS.mrc").string());
+  std::filesystem::rename(folder / "another.st", folder / "other.st");
   std::filesystem::rename(mdoc, folder / "TS.mrc.mdoc");
   EXPECT_EQ(read_project({.path = folder.path()})->settings()[0].value,
             (folder / "TS.mrc").string());

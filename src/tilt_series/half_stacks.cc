@@ -8,6 +8,7 @@
 
 #include "base/check.h"
 #include "base/log.h"
+#include "io/tables/alignment_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::tilt_series {
@@ -55,6 +56,20 @@ void require_finite(const HalfMoments& moments, std::int64_t section, const std:
                   "measured in '{}': "
                   "write the halves with the same masks as the stack of all frames",
                   section + 1, halves, moments.num_not_finite, all));
+}
+
+// Refuses a half whose sections are constant, as black ones are, and names all of them.
+void require_varying(std::span<const std::int64_t> sections, std::span<const HalfMoments> moments,
+                     double HalfMoments::*squares, const std::string& half) {
+  std::vector<std::int64_t> constant;
+  for (std::size_t i = 0; i < sections.size(); ++i)
+    if (moments[i].n > 0 && moments[i].*squares == 0) constant.push_back(sections[i] + 1);
+  if (constant.empty()) return;
+  throw Error(fmt::format(
+      "section{} {} of '{}' {} constant: every pixel has the same value; write the half again, or "
+      "leave {} out with --exclude",
+      constant.size() == 1 ? "" : "s", io::section_list(constant), half,
+      constant.size() == 1 ? "is" : "are", constant.size() == 1 ? "it" : "them"));
 }
 
 // Refuses a sum of halves that does not look like all frames, and warns of one that roughly does.
@@ -114,6 +129,8 @@ HalfMoments HalfStacks::measure(std::int64_t section, const MaskedImage& all) co
     m.all_squares += (a - m.all) * (a - m.all);
     m.sum_squares += sum * sum;
     m.products += (a - m.all) * sum;
+    m.even_squares += (e - m.even) * (e - m.even);
+    m.odd_squares += (o - m.odd) * (o - m.odd);
   });
   return m;
 }
@@ -124,6 +141,8 @@ void HalfStacks::match(std::span<const std::int64_t> sections, std::span<const H
       fmt::format("'{}' and '{}'", stack(Half::kEven).name(), stack(Half::kOdd).name());
   for (std::size_t i = 0; i < sections.size(); ++i)
     require_finite(moments[i], sections[i], names, all.name());
+  require_varying(sections, moments, &HalfMoments::even_squares, stack(Half::kEven).name());
+  require_varying(sections, moments, &HalfMoments::odd_squares, stack(Half::kOdd).name());
   const Slope found = slope_of(moments);
   require_alike(found.correlation, names, all.name());
   const bool is_ratio = are_counts(moments, found.slope);

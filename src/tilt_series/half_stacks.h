@@ -22,6 +22,7 @@ struct HalfMoments {
   double sum_squares = 0;             ///< Σ (even + odd)²
   double products = 0;                ///< Σ all · (even + odd)
   double num_not_finite = 0;          ///< of these pixels, those that are not finite in a half
+  double even_squares = 0, odd_squares = 0;  ///< Σ even², Σ odd²: 0 if a section is constant
 };
 
 /// The even and the odd frames of a series, as two stacks with the sections of the stack of all

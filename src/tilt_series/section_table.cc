@@ -71,8 +71,9 @@ AlignedSection section_of(const io::ListedView& view, io::CentreRule centre,
 
 }  // namespace
 
-SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::ImageStack& stack) {
-  const io::AreTomoAlignment alignment = io::read_aretomo_alignment(path);
+SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::ImageStack& stack,
+                                 bool needs_tilt) {
+  const io::AreTomoAlignment alignment = io::read_aretomo_alignment(path, needs_tilt);
   require_raw_size(alignment, path, stack);
   const auto sections =
       io::assign_aretomo_sections(alignment, path, stack.header().nz, stack.name());
@@ -98,7 +99,7 @@ SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::Im
 SectionTable sections_of_views(const io::ViewTable& table, const io::ImageStack& stack,
                                double pixel_size_A) {
   require_count(table.views.size(), table.file, "views", stack);
-  SectionTable sections{table.file.string(), {}};
+  SectionTable sections{table.file.string(), {}, table.is_nominal};
   for (const io::ListedView& view : table.views) {
     sections.of_section.emplace_back();
     if (view.is_used)

@@ -26,10 +26,13 @@ struct AlignedSection {
 struct SectionTable {
   std::string source;                                     ///< the name of the file
   std::vector<std::optional<AlignedSection>> of_section;  ///< none: left out by that program
+  bool is_nominal = false;  ///< the angles are those of the microscope, and nothing is aligned yet
 };
 
-/// Reads AreTomo's .aln. Throws Error if it is not of this stack.
-SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::ImageStack& stack);
+/// Reads AreTomo's .aln. Throws Error if it is not of this stack. `needs_tilt`: no other file has
+/// the tilt angles.
+SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::ImageStack& stack,
+                                 bool needs_tilt);
 
 /// Converts a table of views to unbinned pixels and to this program's centres (docs/geometry.md).
 /// `stack` has the images that the table lists.

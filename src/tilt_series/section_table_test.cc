@@ -78,7 +78,7 @@ TEST(SectionTable, SaysThatMagnificationsOfAreTomoAreNotApplied) {
     const auto aln = folder.write("a.aln", "# RawSize = 64 48 2\n1 0 1 0 0 0 0 0 0 -10\n2 0 " +
                                                magnification + " 0 0 0 0 0 0 10\n");
     const testing::WarningCatcher warnings;
-    EXPECT_EQ(sections_of_aretomo(aln, stack).of_section[1]->raw_from_aligned.m11, 1.0);
+    EXPECT_EQ(sections_of_aretomo(aln, stack, true).of_section[1]->raw_from_aligned.m11, 1.0);
     return warnings.text();
   };
   EXPECT_EQ(warnings_with("1.00000"), "");

@@ -11,12 +11,14 @@
 #include "base/log.h"
 #include "base/plausible.h"
 #include "geometry/imod_transform.h"
+#include "io/images/own_volume.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/view_table.h"
-#include "option_table/name_list.h"
+#include "tilt_series/contradictions.h"
 #include "tilt_series/resampling/binning.h"
 #include "tilt_series/section_table.h"
 #include "tilt_series/tilt_angles.h"
+#include "tilt_series/tilt_axis.h"
 #include "tomofield/error.h"
 
 namespace tomofield::tilt_series {
@@ -27,6 +29,7 @@ struct InPlaneAlignment {
   std::vector<std::optional<RawFromAligned>> of_section;  ///< none: not aligned (dark frame)
   double sum_cos = 0.0, sum_sin = 0.0;                    ///< over the sections, of the rotation
 
+  double axis_deg() const { return std::atan2(sum_sin, sum_cos) * 180.0 / std::numbers::pi; }
   /// Tells whether the aligned images are as wide as the raw ones are high.
   bool swaps_sizes() const { return std::fabs(sum_sin) > std::fabs(sum_cos); }
 };
@@ -60,12 +63,78 @@ InPlaneAlignment alignment_of_table(const SectionTable& table) {
   return alignment;
 }
 
+/// Returns the alignment of views that are turned by their tilt axis and not shifted.
+InPlaneAlignment alignment_of_axis(double axis_deg, const io::ImageStack& stack) {
+  const double axis_rad = axis_deg * std::numbers::pi / 180.0;
+  InPlaneAlignment alignment;
+  alignment.sum_cos = std::cos(axis_rad);
+  alignment.sum_sin = std::sin(axis_rad);
+  const RawFromAligned turned{alignment.sum_cos, -alignment.sum_sin, alignment.sum_sin,
+                              alignment.sum_cos};
+  alignment.of_section.assign(static_cast<std::size_t>(stack.header().nz), turned);
+  return alignment;
+}
+
+/// Returns the axis of a table of views that are not aligned yet.
+StatedAxis nominal_axis(const SectionTable& table) {
+  const auto first = std::ranges::find_if(table.of_section,
+                                          [](const auto& section) { return section.has_value(); });
+  return {first == table.of_section.end() ? 0.0 : (*first)->rotation_deg,
+          fmt::format("'{}', whose views are not aligned yet", table.source)};
+}
+
+/// Returns the alignment that files give, or that by the tilt axis of a raw stack; nothing for an
+/// aligned stack. Throws Error for a raw stack that nobody aligns.
+std::optional<InPlaneAlignment> find_alignment(const TiltSeriesOptions& options,
+                                               const io::ImageStack& stack,
+                                               const std::optional<SectionTable>& table,
+                                               const std::optional<StatedAxis>& axis) {
+  if (options.xf) return alignment_of_imod(*options.xf, stack);
+  if (table && !table->is_nominal) return alignment_of_table(*table);
+  if (!axis) return std::nullopt;
+  if (axis->is_given || options.starts_raw) return alignment_of_axis(axis->angle_deg, stack);
+  if (table) {
+    throw Error(fmt::format(
+        "'{}' is not aligned yet: it has the nominal tilts and a tilt axis of {:.6g}°. --align "
+        "full "
+        "begins with them; or give the table that RELION's job 'Align tilt-series' wrote",
+        table->source, axis->angle_deg));
+  }
+  require_vertical(*axis, stack);
+  return std::nullopt;
+}
+
 /// Returns what --aln says of the sections, or else the table of views that is given as the stack.
 std::optional<SectionTable> find_section_table(const TiltSeriesOptions& options,
                                                const io::ImageStack& stack, double pixel_size_A) {
-  if (options.aln) return sections_of_aretomo(*options.aln, stack);
+  if (options.aln) return sections_of_aretomo(*options.aln, stack, !options.tlt);
   if (options.images || !io::is_view_table(options.stack)) return std::nullopt;
   return sections_of_views(io::read_view_table(options.stack), stack, pixel_size_A);
+}
+
+/// Returns the pixel size that an .mdoc states for the images of a stack, or 0. Its PixelSpacing is
+/// that of images of ImageSize, which may be binned records of these.
+double pixel_size_of_mdoc(const io::Mdoc& mdoc, const std::filesystem::path& path,
+                          const io::ImageStack& stack) {
+  const double spacing_A = mdoc.pixel_spacing_A.value_or(0.0);
+  if (!base::is_plausible_pixel_size(spacing_A)) return 0.0;
+  if (!mdoc.image_size_px) return spacing_A;
+  const auto [width, height] = *mdoc.image_size_px;
+  const auto ratio = [](std::int64_t a, std::int64_t b) {
+    return static_cast<double>(a) / static_cast<double>(b);
+  };
+  const double across = ratio(stack.header().nx, width), along = ratio(stack.header().ny, height);
+  // Cameras leave out a few rows or columns where they bin.
+  constexpr double kSame = 0.02;
+  const double whole = across >= 1.0 ? std::round(across) : 1.0 / std::round(1.0 / across);
+  if (std::fabs(across / whole - 1.0) < kSame && std::fabs(along / whole - 1.0) < kSame)
+    return spacing_A / whole;
+  base::log_warning(
+      fmt::format("'{}' states pixels of {} Å for images of {} × {}, and those of '{}' have {} × "
+                  "{}: {} Å is taken (give the right size with --pixel-size)",
+                  path.string(), spacing_A, width, height, stack.name(), stack.header().nx,
+                  stack.header().ny, spacing_A));
+  return spacing_A;
 }
 
 /// Returns the size of an unbinned pixel in Å: --pixel-size, else the header's, else the mdoc's.
@@ -83,8 +152,10 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& s
         "with --pixel-size if the header is wrong",
         stack.name(), in_header_A, height_A));
   const bool is_default = in_header_A == 0.0 || in_header_A == 1.0;
-  if (is_default && mdoc && base::is_plausible_pixel_size(mdoc->pixel_spacing_A.value_or(0.0)))
-    return *mdoc->pixel_spacing_A;
+  if (is_default && mdoc) {
+    const double stated_A = pixel_size_of_mdoc(*mdoc, *options.mdoc, stack);
+    if (stated_A > 0.0) return stated_A;
+  }
   if (in_header_A > 0.0) return in_header_A;
   base::log_warning(fmt::format(
       "'{}' has no pixel size; 1 Å is assumed (give it with --pixel-size)", stack.name()));
@@ -134,24 +205,16 @@ std::vector<double> find_x_tilts(const TiltSeriesOptions& options, const io::Ima
   return x_tilts_deg;
 }
 
-/// Throws Error for a raw stack without an alignment, as the tilt axis of the .mdoc shows it.
-void require_vertical_axis(const TiltSeriesOptions& options, const io::Mdoc& mdoc,
-                           const io::ImageStack& stack) {
-  constexpr double kVertical_deg = 1.0;
-  if (!mdoc.tilt_axis_deg) return;
-  const double axis_deg = mdoc.tilt_axis_deg->value;
-  if (std::fabs(std::remainder(axis_deg, 180.0)) <= kVertical_deg) return;
-  if (option_table::has_name(option_table::split_names(options.ignore), "TiltAxisAngle")) return;
-  throw Error(fmt::format(
-      "'{}', line {}: the tilt axis is turned by {}° from the vertical, so '{}' must be aligned: "
-      "give --xf or --aln, or --ignore TiltAxisAngle if its views are aligned already",
-      options.mdoc->string(), mdoc.tilt_axis_deg->line, axis_deg, stack.name()));
-}
-
 void require_compatible(const TiltSeriesOptions& options) {
   if (options.xf && options.aln) {
     throw Error(fmt::format("'{}' (--xf) and '{}' (--aln) both align the views; give one of them",
                             options.xf->string(), options.aln->string()));
+  }
+  if (options.tilt_axis_deg && (options.xf || options.aln)) {
+    throw Error(fmt::format(
+        "--tilt-axis turns views that have no other alignment, and {} '{}' aligns them: "
+        "give one of them",
+        options.xf ? "--xf" : "--aln", (options.xf ? *options.xf : *options.aln).string()));
   }
   if (options.black_level.value_or(0) != 0 && options.contrast == Contrast::kDark)
     throw Error("--black-level is for --contrast bright: leave it out");
@@ -166,6 +229,21 @@ std::array<std::int64_t, 2> aligned_size(const InPlaneAlignment& alignment,
                                          const io::MrcHeader& header) {
   if (alignment.swaps_sizes()) return {header.ny, header.nx};
   return {header.nx, header.ny};
+}
+
+/// Returns the sections that the files and the options leave in.
+std::vector<std::int64_t> used_sections(const TiltSeriesOptions& options, std::int64_t num_sections,
+                                        const std::vector<std::int64_t>& excluded,
+                                        const std::optional<InPlaneAlignment>& alignment) {
+  std::vector<std::int64_t> used;
+  for (std::int64_t section = 0; section < num_sections; ++section) {
+    const bool is_dark =
+        alignment && !alignment->of_section[static_cast<std::size_t>(section)].has_value();
+    if (!is_dark && !std::ranges::binary_search(excluded, section) &&
+        !std::ranges::binary_search(options.left_out, section))
+      used.push_back(section);
+  }
+  return used;
 }
 
 void correct(const geometry::ViewCorrection& correction, PlannedView& planned) {
@@ -184,51 +262,56 @@ std::array<std::int64_t, 2> aligned_size(const std::filesystem::path& xf,
 SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& stack) {
   require_compatible(options);
   const io::MrcHeader& header = stack.header();
+  if (io::is_own_volume(header)) {
+    throw Error(fmt::format(
+        "'{}' is a volume that tomofield wrote, and no tilt series: give the stack", stack.name()));
+  }
   const auto mdoc = options.mdoc ? std::optional(io::read_mdoc(*options.mdoc)) : std::nullopt;
   SeriesPlan plan;
   plan.pixel_size_A = find_pixel_size(options, stack, mdoc);
   const auto table = find_section_table(options, stack, plan.pixel_size_A);
-  TiltAngles angles = find_tilt_angles(options, stack, table, mdoc);
-  for (auto& angle : angles.of_section)
-    if (angle) angle->value += options.tilt_offset_deg;
-  if (mdoc && std::ssize(mdoc->sections) != header.nz) {
-    base::log_warning(fmt::format("'{}' has {} sections and '{}' {}: are they of one series?",
-                                  options.mdoc->string(), mdoc->sections.size(), stack.name(),
-                                  header.nz));
-  }
+  const TiltAngles angles = find_tilt_angles(options, stack, table, mdoc);
   const std::vector<double> x_tilts_deg = find_x_tilts(options, stack, table);
   const auto excluded = io::parse_section_list(options.exclude, header.nz);
 
-  std::optional<InPlaneAlignment> alignment;
-  if (options.xf)
-    alignment = alignment_of_imod(*options.xf, stack);
-  else if (table)
-    alignment = alignment_of_table(*table);
-  if (mdoc && !alignment) require_vertical_axis(options, *mdoc, stack);
+  const bool has_alignment = options.xf || (table && !table->is_nominal);
+  auto axis = find_stated_axis(options, stack, mdoc, has_alignment);
+  if (table && table->is_nominal && !options.tilt_axis_deg) axis = nominal_axis(*table);
+  const auto alignment = find_alignment(options, stack, table, axis);
+  // A series that is aligned is opened several times, and says this once.
+  if (options.corrections.empty() && options.left_out.empty()) {
+    if (mdoc) warn_of_other_angles(angles, *options.mdoc, *mdoc, stack);
+    warn_of_other_angles(angles, stack);
+    if (axis && alignment) warn_of_other_axis(*axis, alignment->axis_deg(), options, stack);
+    if (options.starts_raw && !axis && !alignment) warn_of_unknown_axis(stack);
+  }
 
   plan.angle_source = angles.source;
   plan.is_raw = alignment.has_value();
+  if (axis && alignment && !has_alignment)
+    plan.axis = fmt::format("{:.6g}° from {}", axis->angle_deg, axis->source);
   const auto size = aligned_size(alignment.value_or(InPlaneAlignment{}), header);
   plan.aligned_width = size[0];
   plan.aligned_height = size[1];
   plan.bin_factor = find_bin_factor(options, plan);
-  for (std::int64_t section = 0; section < header.nz; ++section) {
+  const std::vector<std::int64_t> sections = used_sections(options, header.nz, excluded, alignment);
+  if (sections.empty()) {
+    throw Error(
+        fmt::format("no section of '{}' is left to reconstruct from; exclude fewer", stack.name()));
+  }
+  TiltAngles tilts = angles;
+  for (auto& tilt : tilts.of_section)
+    if (tilt) tilt->value += options.tilt_offset_deg;
+  require_usable_tilts(tilts, sections);
+  for (const std::int64_t section : sections) {
     const auto at = static_cast<std::size_t>(section);
-    const bool is_dark = alignment && !alignment->of_section[at];
-    if (is_dark || std::ranges::binary_search(excluded, section) ||
-        std::ranges::binary_search(options.left_out, section))
-      continue;
     PlannedView planned;
-    planned.view = {section, require_usable_tilt(angles, section),
+    planned.view = {section, tilts.of_section[at]->value,
                     x_tilts_deg[at] - options.x_axis_tilt_deg};
     if (alignment) planned.raw_from_aligned = *alignment->of_section[at];
     if (!options.corrections.empty()) correct(options.corrections[at], planned);
     TOMOFIELD_CHECK(options.resample || !planned.local, "local motion of views as recorded");
     plan.views.push_back(planned);
-  }
-  if (plan.views.empty()) {
-    throw Error(
-        fmt::format("no section of '{}' is left to reconstruct from; exclude fewer", stack.name()));
   }
   return plan;
 }

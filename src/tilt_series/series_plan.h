@@ -29,6 +29,7 @@ struct SeriesPlan {
   double pixel_size_A = 1.0;  ///< of an unbinned pixel
   double bin_factor = 1.0;
   std::string angle_source;  ///< for messages: a file name, or the stack's header
+  std::string axis;  ///< for messages: the axis by which views are turned, and what states it
 };
 
 /// Returns the width and the height that IMOD's transforms give the aligned views, in unbinned

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tomofield/error.h"
@@ -40,7 +41,42 @@ TiltAngles angles_of_table(const SectionTable& table) {
   return angles;
 }
 
+// Describes sections, counted from 1, that are tilted too far.
+std::string describe_steep(const TiltAngles& angles, const std::vector<std::int64_t>& steep) {
+  std::vector<std::string> texts;
+  for (const std::int64_t section : steep) {
+    const io::NumberLine& angle = *angles.of_section[static_cast<std::size_t>(section - 1)];
+    texts.push_back(fmt::format("{}° of section {}{}", angle.value, section,
+                                angle.line > 0 ? fmt::format(" (line {})", angle.line) : ""));
+  }
+  const bool is_one = steep.size() == 1;
+  return fmt::format(
+      "'{}': the tilt angle{} {} {} beyond ±{:.0f}°, which cannot be reconstructed; correct {}, or "
+      "leave the section{} out with --exclude {}",
+      angles.source, is_one ? "" : "s", fmt::join(texts, ", "), is_one ? "is" : "are",
+      kLargestTilt_deg, is_one ? "it" : "them", is_one ? "" : "s", io::section_list(steep));
+}
+
+void require_different(const TiltAngles& angles, std::span<const std::int64_t> sections) {
+  const auto tilt_deg = [&](std::int64_t section) {
+    return angles.of_section[static_cast<std::size_t>(section)]->value;
+  };
+  if (sections.size() < 2) return;
+  if (std::ranges::any_of(sections, [&](std::int64_t section) {
+        return tilt_deg(section) != tilt_deg(sections.front());
+      }))
+    return;
+  throw Error(
+      fmt::format("'{}': the tilts of all {} sections are {}°, which is no tilt series: give the "
+                  "file of the tilt angles with --tlt",
+                  angles.source, sections.size(), tilt_deg(sections.front()) + 0.0));
+}
+
 }  // namespace
+
+std::string source_of_header(const io::ImageStack& stack) {
+  return fmt::format("extended header of {}", stack.name());
+}
 
 void require_count(std::size_t found, const std::filesystem::path& file, const char* what,
                    const io::ImageStack& stack) {
@@ -55,39 +91,45 @@ TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::ImageSta
                             const std::optional<SectionTable>& table,
                             const std::optional<io::Mdoc>& mdoc) {
   if (options.tlt) {
-    const auto numbers = io::read_number_column(*options.tlt, "a tilt angle in degrees");
+    const auto numbers = io::read_tilt_table(*options.tlt).angles;
     require_count(numbers.size(), *options.tlt, "angles", stack);
     return {options.tlt->string(), {numbers.begin(), numbers.end()}};
   }
   if (table) return angles_of_table(*table);
-  if (mdoc) return angles_of_mdoc(*mdoc, *options.mdoc, stack);
   const auto& extended = stack.header().extended_tilt_deg;
+  // The .mdoc of the whole series, beside a stack from which sections were cut, has more sections.
+  const bool is_of_others = mdoc && std::ssize(mdoc->sections) != stack.header().nz;
+  if (mdoc && (!is_of_others || extended.empty()))
+    return angles_of_mdoc(*mdoc, *options.mdoc, stack);
   if (extended.empty()) {
     throw Error(
         fmt::format("no tilt angles for '{}': its header has none, so give them with --tlt FILE "
                     "(.tlt or .rawtlt), --aln FILE (AreTomo) or --mdoc FILE (SerialEM)",
                     stack.name()));
   }
-  TiltAngles angles{fmt::format("extended header of {}", stack.name()), {}};
+  TiltAngles angles{source_of_header(stack), {}};
   for (const double tilt_deg : extended) angles.of_section.push_back(io::NumberLine{tilt_deg, 0});
   return angles;
 }
 
-double require_usable_tilt(const TiltAngles& angles, std::int64_t section) {
-  const auto& angle = angles.of_section[static_cast<std::size_t>(section)];
-  if (!angle) {
-    throw Error(fmt::format("'{}' has no tilt angle for section {}; leave it out with --exclude {}",
-                            angles.source, section + 1, section + 1));
+void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t> sections) {
+  std::vector<std::int64_t> missing, steep;
+  for (const std::int64_t section : sections) {
+    const auto& angle = angles.of_section[static_cast<std::size_t>(section)];
+    if (!angle)
+      missing.push_back(section + 1);
+    else if (!(std::fabs(angle->value) <= kLargestTilt_deg))  // also if it is not a number
+      steep.push_back(section + 1);
   }
-  if (!(std::fabs(angle->value) <= kLargestTilt_deg)) {  // also if it is not a number
-    const std::string line = angle->line > 0 ? fmt::format(", line {}", angle->line) : "";
+  if (!missing.empty()) {
     throw Error(
-        fmt::format("'{}'{}: the tilt angle {}° of section {} is beyond ±{:.0f}°, which "
-                    "cannot be reconstructed; correct it, or leave the section out with "
-                    "--exclude {}",
-                    angles.source, line, angle->value, section + 1, kLargestTilt_deg, section + 1));
+        fmt::format("'{0}' has no tilt angle for section{1} {2}; leave {3} out with --exclude "
+                    "{2}",
+                    angles.source, missing.size() == 1 ? "" : "s", io::section_list(missing),
+                    missing.size() == 1 ? "it" : "them"));
   }
-  return angle->value;
+  if (!steep.empty()) throw Error(describe_steep(angles, steep));
+  require_different(angles, sections);
 }
 
 }  // namespace tomofield::tilt_series

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,11 +27,15 @@ TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::ImageSta
                             const std::optional<SectionTable>& table,
                             const std::optional<io::Mdoc>& mdoc);
 
+/// Returns what TiltAngles::source is for angles in the extended header of a stack.
+std::string source_of_header(const io::ImageStack& stack);
+
 /// Throws Error with both numbers and both files unless they are equal.
 void require_count(std::size_t found, const std::filesystem::path& file, const char* what,
                    const io::ImageStack& stack);
 
-/// Throws Error (file, line, value) for an angle that is missing or beyond ±80°.
-double require_usable_tilt(const TiltAngles& angles, std::int64_t section);
+/// Throws Error that names all of these sections at once whose angle is missing or beyond ±80°
+/// (file, line, value), or if the angles of several sections are all the same.
+void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t> sections);
 
 }  // namespace tomofield::tilt_series

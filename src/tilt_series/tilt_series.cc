@@ -201,6 +201,7 @@ struct TiltSeries::Impl {
                     std::min_element(views.begin(), views.end(), has_lower_tilt)->tilt_deg,
                     std::max_element(views.begin(), views.end(), has_lower_tilt)->tilt_deg,
                     plan.angle_source, width, height, plan.pixel_size_A * plan.bin_factor));
+    if (!plan.axis.empty()) base::log_info(fmt::format("tilt axis of the views: {}", plan.axis));
     if (fixed_pattern.is_any())
       base::log_info("fixed pattern removed: " + describe_pattern(fixed_pattern));
   }
@@ -215,7 +216,8 @@ struct TiltSeries::Impl {
     processes.allreduce_sum(std::span(moments), &HalfMoments::n, &HalfMoments::all,
                             &HalfMoments::even, &HalfMoments::odd, &HalfMoments::all_squares,
                             &HalfMoments::sum_squares, &HalfMoments::products,
-                            &HalfMoments::num_not_finite);
+                            &HalfMoments::num_not_finite, &HalfMoments::even_squares,
+                            &HalfMoments::odd_squares);
     processes.run_collectively([&] {
       std::vector<std::int64_t> sections;
       for (const View& view : views) sections.push_back(view.section);

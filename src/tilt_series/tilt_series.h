@@ -29,6 +29,9 @@ namespace tomofield::tilt_series {
 struct TiltSeriesOptions : SeriesFiles, ViewOptions {
   std::shared_ptr<const io::ImageStack> images = {};  ///< views in memory, in place of `stack`
   bool resample = true;  ///< false: views stay as they were recorded, with their alignment beside
+  /// The views will be aligned from the direction of their tilt axis on, as files state it. Else a
+  /// stack whose stated axis is not vertical needs an alignment.
+  bool starts_raw = false;
   /// False: decoded views are given up as soon as they have been checked and measured.
   bool keep_views = true;
   /// False: no view is looked at, so that only what follows from headers and small files is known.

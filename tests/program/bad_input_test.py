@@ -287,7 +287,6 @@ def test_options_that_make_no_sense(good, out, refuse, refuse_series, stack, tlt
     refuse(["--thickness"], "reconstruct", stack, "-o", out, "--tlt", tlt)
     refuse(["-o", "--output"][1:], "reconstruct", stack, *good)
     refuse(["stack"], "reconstruct", "-o", out, *good)
-    refuse(["--help"])
     refuse(["reconstrct"], "reconstrct")
     # Every mistake is named at once.
     refuse_series(["--tv", "--rank", "--leaf-size"], stack, "--tv", -1, "--rank", 0,

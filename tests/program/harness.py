@@ -108,6 +108,23 @@ def read_volume(path):
         return file.data.astype(np.float64)
 
 
+def distances_of_beads(volume, beads):
+    """Returns how far the bright spots of a volume [z, y, x] are from where beads should be: their
+    positions (x, y, z) count in voxels from its centre. A spot is the centre of mass of what is
+    brighter than half of its peak, within 3 voxels of the place."""
+    centre = (np.array(volume.shape[::-1]) - 1) / 2
+    distances = []
+    for bead in beads:
+        place = centre + bead
+        first = np.maximum(np.round(place).astype(int) - 3, 0)
+        x, y, z = first
+        box = volume[z:z + 7, y:y + 7, x:x + 7]
+        weights = np.clip(box - (box.max() + np.median(box)) / 2, 0, None)
+        spot = [(weights * index).sum() / weights.sum() for index in np.indices(box.shape)]
+        distances.append(np.linalg.norm(first + spot[::-1] - place))
+    return np.array(distances)
+
+
 def read_bytes(path):
     with open(path, "rb") as file:
         return file.read()

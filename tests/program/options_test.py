@@ -11,13 +11,14 @@ PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs/options.md"
 ROW = re.compile(r"^\| `([^`]+)` \|.*\| `([^`]+)` \|$", re.MULTILINE)
 COMMON = {"stack", "--tlt", "--xf", "--aln", "--bin", "--contrast", "--thickness", "--roi", "--tune",
           "--align", "--output", "--overwrite", "--resume", "--dry-run", "--threads", "--config",
-          "--help", "--help-all", "--denoise"}
+          "--help", "--help-all", "--denoise", "--ctf", "--defocus", "--mdoc", "--exclude", "--angpix",
+          "--invert", "--even", "--odd", "--zarr"}
 
 
 def flags_of_keys():
     """Returns the flag of every key in docs/options.md."""
     rows = {key: flags.split(",")[-1] for flags, key in ROW.findall(PAGE.read_text("utf-8"))}
-    assert len(rows) == 87, len(rows)
+    assert len(rows) == 88, len(rows)
     return rows
 
 

@@ -70,6 +70,8 @@ void print_extended_header(const io::MrcHeader& header) {
   if (tilts.empty()) return;
   const auto [low, high] = std::minmax_element(tilts.begin(), tilts.end());
   print("  tilt angles      {} in the extended header, {}° to {}°\n", tilts.size(), *low, *high);
+  if (header.extended_axis_deg)
+    print("  tilt axis        {:.4g}° in the extended header\n", *header.extended_axis_deg);
 }
 
 void print_mrc(const std::filesystem::path& path) {
@@ -78,7 +80,7 @@ void print_mrc(const std::filesystem::path& path) {
   print("{}: MRC {}\n", path.string(), header.is_volume ? "volume" : "image stack");
   print("  size             {} × {} × {} (x, y, sections)\n", header.nx, header.ny, header.nz);
   print("  values           {}{}, {}-endian\n", io::describe(header.mode),
-        header.bytes_are_unsigned ? " read as unsigned (IMOD's stamp)" : "",
+        header.bytes_are_unsigned ? " read as unsigned (IMOD's rule)" : "",
         header.is_byte_swapped ? "big" : "little");
   print_voxel_size(header);
   print("  origin           {:.7g}, {:.7g}, {:.7g} Å\n", header.origin_A[0], header.origin_A[1],

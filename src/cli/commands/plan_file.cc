@@ -6,6 +6,7 @@
 
 #include "base/threads/parallel.h"
 #include "base/time_text.h"
+#include "base/utf8.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
 #include "io/json.h"
@@ -77,8 +78,11 @@ void write_plan(const std::filesystem::path& file, const options::ReconstructOpt
     for (const auto& added : io::added_inputs()) inputs.push_back(added);
     const nlohmann::json seconds =
         estimate.core_seconds ? nlohmann::json(*estimate.core_seconds) : nlohmann::json(nullptr);
+    const std::string stack =
+        std::filesystem::absolute(options.files.stack).lexically_normal().string();
     io::write_json(file,
                    {{"tomofield", TOMOFIELD_VERSION},
+                    {"stack", base::utf8_text(stack)},
                     {"views", plan.num_views},
                     {"view_size_px", {plan.view_width, plan.view_height}},
                     {"pixel_size_A", plan.pixel_size_A},

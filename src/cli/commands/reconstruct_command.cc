@@ -12,7 +12,9 @@
 #include "cli/options/table_options.h"
 #include "cli/options/trace_option.h"
 #include "options/run_options.h"
+#include "output/output_paths.h"
 #include "reconstruct/run_files.h"
+#include "tomofield/error.h"
 
 namespace tomofield::cli {
 namespace {
@@ -25,8 +27,18 @@ struct ReconstructArguments {
   std::optional<std::filesystem::path> trace, plan, choice;
 };
 
+// Gives the tomogram of a dry run a name, which is needed and not written.
+void require_output(RunOptions& run, bool dry_run) {
+  if (!run.output.empty()) return;
+  if (!dry_run)
+    throw Error("--output is required: name the tomogram with -o (--dry-run needs none)");
+  run.output = "tomofield_dry_run.mrc";
+  run.overwrite = true;
+}
+
 void run(ReconstructArguments& arguments, const distributed::Communicator& processes,
          const std::vector<Setting>& origins) {
+  require_output(arguments.choices.options.run, arguments.dry_run.is_wanted);
   option_table::note_settings(origins, arguments.choices);
   options::ReconstructOptions options =
       options::run_options(arguments.choices.files, arguments.choices.options);
@@ -56,6 +68,8 @@ void add_reconstruct_command(CLI::App& program, const distributed::Communicator&
              {Group::kTransfer, Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume,
               Group::kHalves});
   add_run_options(command, arguments->choices, arguments->dry_run);
+  CLI::Option* const output = command.get_option("--output")->required(false);
+  output->description(output->get_description() + " (required without --dry-run)");
   add_common_options(command);
   add_trace_option(command, arguments->trace);
   add_plan_option(command, arguments->plan);

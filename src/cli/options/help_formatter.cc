@@ -84,20 +84,43 @@ std::string usage_of(const CLI::App& command, const std::string& name) {
   return usage + (has_commands ? " COMMAND\n" : "\n");
 }
 
+std::string name_of(const CLI::Option& option, bool is_positional) {
+  std::string name = option.get_name(is_positional, true);
+  if (option.get_items_expected_max() > 0 && !option.get_type_name().empty() && !is_positional)
+    name += " " + option.get_type_name();
+  return name;
+}
+
+// Returns an option with the beginning of its description, and its notes if they are few.
+std::string short_entry(const CLI::Option& option) {
+  constexpr std::size_t kMostNotes = 45;
+  std::string text = option.get_description();
+  for (const char* end : {". ", ": ", "; "}) text.erase(std::min(text.find(end), text.size()));
+  const std::string notes = notes_of(option);
+  if (width_of(notes) <= kMostNotes) text += notes;
+  return entry(name_of(option, option.get_positional()), text);
+}
+
 }  // namespace
 
 std::string HelpFormatter::make_help(const CLI::App* command, std::string name,
                                      CLI::AppFormatMode mode) const {
+  const bool is_short =
+      mode == CLI::AppFormatMode::Normal && command->get_help_all_ptr() != nullptr;
   std::string help = command->get_description() + "\n" + usage_of(*command, name);
   if (!command->get_footer().empty()) help += command->get_footer() + "\n";
   const auto add_section = [&](const std::string& title, const auto& is_of_section) {
     std::string lines;
     for (const CLI::Option* option : command->get_options()) {
-      if (is_of_section(*option) && is_shown(*option, mode))
-        lines += make_option(option, option->get_positional());
+      if (!is_of_section(*option) || !is_shown(*option, mode)) continue;
+      lines += is_short ? short_entry(*option) : make_option(option, option->get_positional());
     }
     if (!lines.empty()) help += "\n" + title + ":\n" + lines;
   };
+  if (is_short) {  // one screen
+    add_section("Options", [](const CLI::Option& option) { return !option.get_group().empty(); });
+    return help;
+  }
   add_section("Arguments", [](const CLI::Option& option) { return option.get_positional(); });
   for (const std::string& group : command->get_groups()) {
     if (group.empty()) continue;  // hidden options
@@ -112,10 +135,7 @@ std::string HelpFormatter::make_help(const CLI::App* command, std::string name,
 }
 
 std::string HelpFormatter::make_option(const CLI::Option* option, bool is_positional) const {
-  std::string name = option->get_name(is_positional, true);
-  if (option->get_items_expected_max() > 0 && !option->get_type_name().empty() && !is_positional)
-    name += " " + option->get_type_name();
-  return entry(name, option->get_description() + notes_of(*option));
+  return entry(name_of(*option, is_positional), option->get_description() + notes_of(*option));
 }
 
 std::string HelpFormatter::make_subcommand(const CLI::App* command) const {

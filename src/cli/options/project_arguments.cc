@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <optional>
 #include <string_view>
@@ -76,7 +77,9 @@ std::string winner_over(const Setting& setting, const CLI::App& command, const W
   if (is_given(*command.get_option(setting.option), given)) return setting.option;
   const bool is_of_intensities = setting.option == "--log" || setting.option == "--log-base";
   if (is_of_intensities && value_of("--contrast", given) == "bright") return "--contrast bright";
-  const bool is_transfer = setting.option == "--ctf";
+  constexpr std::array<std::string_view, 6> kOfTransfer{
+      "--ctf", "--mtf", "--cs", "--amplitude-contrast", "--ctf-phase-flipped", "--defocus-hand"};
+  const bool is_transfer = std::ranges::find(kOfTransfer, setting.option) != kOfTransfer.end();
   if (is_transfer && value_of("--engine", given) == "ray") return "--engine ray";
   for (const auto& [option, rival] : kRivals) {
     if (option == setting.option && is_given(*command.get_option(std::string(rival)), given))
@@ -110,7 +113,9 @@ std::vector<Setting> expand_project(const CLI::App& program, Words& arguments) {
       projects::read_project({.path = *stack,
                               .ignored = option_table::split_names(value_of(kIgnore, arguments)),
                               .series = value_of(kSeries, arguments),
-                              .has_mdoc = !value_of("--mdoc", arguments).empty()});
+                              .has_mdoc = !value_of("--mdoc", arguments).empty(),
+                              .has_transfer = !value_of("--defocus", arguments).empty() ||
+                                              !value_of("--ctf", arguments).empty()});
   if (!project) return {};
   for (const auto& file : project->files()) io::add_input(file);
   const Words given = arguments;

@@ -44,7 +44,7 @@ enum class Message : int {
 };
 
 [[noreturn]] void refuse_feature(std::string_view what) {
-  throw Error(fmt::format("it has {}, which tomofield does not write", what));
+  throw ForeignHdf5(fmt::format("it has {}, which tomofield does not write", what));
 }
 void require(bool condition, std::string_view what) {
   if (!condition) throw Error(std::string(what));

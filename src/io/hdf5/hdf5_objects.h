@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "io/saving/positioned_file.h"
+#include "tomofield/error.h"
 
 namespace tomofield::io {
 
@@ -38,11 +39,17 @@ struct Hdf5Object {
   std::int64_t address = 0;                    ///< of the array's first byte in the file
 };
 
+/// Says what a file has that tomofield does not write: it is of another program, or damaged.
+class ForeignHdf5 : public Error {
+ public:
+  using Error::Error;
+};
+
 /// Reads all groups, attributes and descriptions of arrays of a file, and checks all checksums of
-/// the format. Throws Error if anything is damaged, lies beyond the end of the file, overlaps
-/// something else, or is a feature of HDF5 that tomofield does not write: other versions of the
-/// format, links, external, virtual, chunked or filtered arrays, other types. What it returns takes
-/// memory in proportion to the file, and so do all of its arrays together.
+/// the format. Throws Error if anything is damaged, lies beyond the end of the file or overlaps
+/// something else, and ForeignHdf5 if it is a feature of HDF5 that tomofield does not write: other
+/// versions of the format, links, external, virtual, chunked or filtered arrays, other types. What
+/// it returns takes memory in proportion to the file, and so do all of its arrays together.
 Hdf5Object read_hdf5_objects(const PositionedFile& file);
 
 }  // namespace tomofield::io

@@ -205,6 +205,12 @@ Hdf5Reader::Hdf5Reader(const std::filesystem::path& path) {
     Hdf5Object root = read_hdf5_objects(file);
     file_ = std::make_shared<const StoredGroup::File>(
         StoredGroup::File{std::move(file), std::move(root)});
+  } catch (const ForeignHdf5& error) {
+    throw Error(
+        fmt::format("'{}' is an HDF5 file and no model of tomofield (or a damaged one): {}. A "
+                    "stack must be MRC or "
+                    "TIFF: convert it with IMOD's newstack -format MRC or EMAN2's e2proc2d.py",
+                    name, error.what()));
   } catch (const Error& error) {
     throw Error(fmt::format(
         "'{}' is damaged or incomplete, or was not written by tomofield: {}; use another copy",

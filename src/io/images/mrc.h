@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -36,7 +37,9 @@ struct MrcHeader {
   bool bytes_are_unsigned = false;  ///< mode 0 with IMOD's stamp and without its signed flag
   std::int64_t extended_header_bytes = 0;
   std::string extended_header_type;
-  std::vector<double> extended_tilt_deg;  ///< angles of a SERI header with flag 1, else empty
+  std::vector<double> extended_tilt_deg;  ///< angles in the extended header, one a section, or none
+  /// Direction of the tilt axis in the extended header, counter-clockwise from +Y.
+  std::optional<double> extended_axis_deg;
   std::vector<std::string> labels;
 };
 

@@ -36,8 +36,6 @@ enum Offset : std::size_t {
   kExtendedBytes = 92,
   kExtendedType = 104,
   kVersion = 108,
-  kBytesPerSection = 128,  // IMOD and SerialEM: int16
-  kSectionFlags = 130,     // IMOD and SerialEM: int16
   kImodStamp = 152,
   kImodFlags = 156,
   kOrigin = 196,
@@ -59,7 +57,6 @@ class Fields {
   Fields(const MrcHeaderBytes& bytes, bool swapped) : bytes_(bytes), swapped_(swapped) {}
 
   std::int32_t int32(std::size_t offset) const { return get<std::int32_t>(offset); }
-  std::int16_t int16(std::size_t offset) const { return get<std::int16_t>(offset); }
   double float32(std::size_t offset) const { return get<float>(offset); }
   std::string text(std::size_t offset, std::size_t length) const {
     const auto* first = reinterpret_cast<const char*>(bytes_.data() + offset);
@@ -136,25 +133,16 @@ double decode_voxel_size(const Fields& fields, std::size_t axis) {
   return base::is_plausible_pixel_size(size_A) ? size_A : 0.0;
 }
 
-// Returns the bytes a section that SerialEM's flags announce (IMOD's description of the header).
-int bytes_of_section_flags(int flags) {
-  int bytes = 0;
-  constexpr std::array<int, 6> kBytesOfFlag{2, 6, 4, 2, 2, 4};
-  for (std::size_t bit = 0; bit < kBytesOfFlag.size(); ++bit) {
-    if ((flags >> bit) & 1) bytes += kBytesOfFlag[bit];
-  }
-  return bytes;
-}
-
-SeriLayout decode_seri_layout(const Fields& fields, const MrcHeader& header) {
-  const std::int64_t bytes = fields.int16(kBytesPerSection);
-  const int flags = fields.int16(kSectionFlags);
-  // Files older than the type code are recognised by sizes that agree.
-  const bool is_seri =
-      header.extended_header_type == "SERI" ||
-      (header.extended_header_type.empty() && bytes == bytes_of_section_flags(flags));
-  const bool fits = bytes >= 2 && bytes * header.nz <= header.extended_header_bytes;
-  return {is_seri && (flags & 1) && fits ? bytes : 0};
+// Tells whether bytes count from 0 to 255. IMOD's stamp says so; without it, IMOD's rule of the
+// minimum and the maximum does (readBytesSigned in b3dutil.c), and bytes are signed, as in MRC2014,
+// where these do not tell.
+bool has_unsigned_bytes(const Fields& fields, const MrcHeader& header) {
+  constexpr double kEndOfSigned = 128;
+  if (header.mode != MrcMode::kInt8) return false;
+  if (fields.int32(kImodStamp) == kImodStampValue)
+    return (fields.int32(kImodFlags) & kImodSignedBytes) == 0;
+  if (!(header.max >= kEndOfSigned)) return false;
+  return header.min >= 0 || -header.min <= header.max - kEndOfSigned;
 }
 
 // Tells whether ORIGIN has IMOD's sign, the opposite of MRC2014's. Versions of this program that
@@ -187,11 +175,12 @@ std::string describe(MrcMode mode) {
   return fmt::format("{} (mode {})", name, static_cast<int>(mode));
 }
 
-MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name,
-                            SeriLayout* seri) {
+MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name) {
   if (std::memcmp(bytes.data(), "\x89HDF", 4) == 0) {
     throw Error(fmt::format(
-        "'{}' is an HDF5 file, not MRC: if it is a model, `tomofield export` writes a volume of it",
+        "'{}' is an HDF5 file, not MRC: if it is a model, `tomofield export` writes a volume of "
+        "it, "
+        "and a stack is converted by IMOD's newstack -format MRC or EMAN2's e2proc2d.py",
         name));
   }
   MrcHeader header;
@@ -212,9 +201,7 @@ MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name
   header.mean = fields.float32(kMean);
   header.rms = fields.float32(kRms);
   header.is_volume = fields.int32(kSpaceGroup) == 1;
-  header.bytes_are_unsigned = header.mode == MrcMode::kInt8 &&
-                              fields.int32(kImodStamp) == kImodStampValue &&
-                              (fields.int32(kImodFlags) & kImodSignedBytes) == 0;
+  header.bytes_are_unsigned = has_unsigned_bytes(fields, header);
   header.extended_header_bytes = fields.int32(kExtendedBytes);
   if (header.extended_header_bytes < 0) {
     throw Error(
@@ -231,7 +218,6 @@ MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name
   if (has_imod_origin(fields, header)) {
     for (double& origin_A : header.origin_A) origin_A = origin_A == 0.0 ? 0.0 : -origin_A;
   }
-  *seri = decode_seri_layout(fields, header);
   return header;
 }
 
@@ -250,18 +236,6 @@ std::int64_t expected_file_bytes(const MrcHeader& header, const std::string& nam
                     name, header.nx, header.ny, header.nz));
   }
   return bytes;
-}
-
-std::vector<double> decode_seri_tilts(std::span<const std::byte> extended_header,
-                                      const SeriLayout& seri, const MrcHeader& header) {
-  std::vector<double> tilts;
-  for (std::int64_t section = 0; section < header.nz; ++section) {
-    const auto at = static_cast<std::size_t>(section * seri.bytes_per_section);
-    std::array<std::byte, 2> raw{extended_header[at], extended_header[at + 1]};
-    if (header.is_byte_swapped) std::swap(raw[0], raw[1]);
-    tilts.push_back(std::bit_cast<std::int16_t>(raw) / 100.0);
-  }
-  return tilts;
 }
 
 MrcHeaderBytes encode_mrc_header(const MrcHeader& header) {

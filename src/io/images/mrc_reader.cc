@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "io/images/mrc.h"
+#include "io/images/mrc_extended.h"
 #include "io/images/mrc_format.h"
 #include "io/saving/positioned_file.h"
 #include "tomofield/error.h"
@@ -26,8 +27,7 @@ struct MrcReader::Impl {
     }
     MrcHeaderBytes bytes;
     file.read_at(0, bytes.data(), bytes.size());
-    SeriLayout seri;
-    header = decode_mrc_header(bytes, name, &seri);
+    header = decode_mrc_header(bytes, name);
     const std::int64_t expected = expected_file_bytes(header, name);
     if (found < expected) {
       throw Error(fmt::format(
@@ -36,11 +36,21 @@ struct MrcReader::Impl {
           name, header.nx, header.ny, header.nz, describe(header.mode),
           header.extended_header_bytes, expected, found));
     }
-    if (seri.bytes_per_section > 0) {
-      std::vector<std::byte> extended(static_cast<std::size_t>(seri.bytes_per_section * header.nz));
-      file.read_at(kMrcHeaderBytes, extended.data(), extended.size());
-      header.extended_tilt_deg = decode_seri_tilts(extended, seri, header);
-    }
+    read_extended_header(bytes);
+  }
+
+  void read_extended_header(const MrcHeaderBytes& bytes) {
+    const ExtendedRecords records = find_extended_records(bytes, header);
+    if (records.layout == ExtendedLayout::kNone) return;
+    // Files of several megabytes of metadata have records for no more than some thousand sections.
+    constexpr std::int64_t kMostBytes = std::int64_t{1} << 24;
+    const std::int64_t needed = records.bytes_per_section > 0
+                                    ? records.bytes_per_section * header.nz
+                                    : header.extended_header_bytes;
+    if (needed > kMostBytes) return;
+    std::vector<std::byte> extended(static_cast<std::size_t>(needed));
+    file.read_at(kMrcHeaderBytes, extended.data(), extended.size());
+    read_extended_records(extended, records, header);
   }
 };
 

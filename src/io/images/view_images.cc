@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "io/is_file.h"
+#include "io/named_file.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
@@ -14,17 +15,19 @@ namespace tomofield::io {
 namespace fs = std::filesystem;
 namespace {
 
+// Looks for a file in the current folder, and in that of `list` and those above it.
 std::optional<fs::path> look_for(const fs::path& name, const fs::path& list) {
   if (is_file(name)) return name;
-  if (name.is_absolute()) return std::nullopt;
+  std::vector<fs::path> folders;
   std::error_code failed;
   fs::path folder = fs::absolute(list, failed).parent_path();
   while (!failed) {
-    if (is_file(folder / name)) return (folder / name).lexically_normal();
+    folders.push_back(folder);
     if (folder == folder.parent_path()) break;
     folder = folder.parent_path();
   }
-  return std::nullopt;
+  const auto found = find_named_file(name.string(), folders);
+  return found ? std::optional(found->lexically_normal()) : std::nullopt;
 }
 
 // Returns the name of the image that a row means.

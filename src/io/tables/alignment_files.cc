@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
 
 #include "io/tables/text_lines.h"
@@ -31,6 +32,11 @@ bool is_plausible_matrix(const ImodTransform& t) {
   return determinant > 0 && largest <= kLargestStretch && determinant >= largest / kLargestStretch;
 }
 
+constexpr std::string_view kForm =
+    "a tilt angle, alone, or with its place in the order of recording and its dose, as in AreTomo "
+    "3's "
+    "_TLT.txt; of any others keep one column, the tilt angles in degrees from -360 to 360";
+
 }  // namespace
 
 std::vector<NumberLine> read_number_column(const std::filesystem::path& path,
@@ -51,6 +57,31 @@ std::vector<NumberLine> read_number_column(const std::filesystem::path& path,
     numbers.push_back({*value, line.number});
   }
   return numbers;
+}
+
+TiltTable read_tilt_table(const std::filesystem::path& path) {
+  constexpr std::string_view kQuantity = "a tilt angle in degrees";
+  const std::vector<TextLine> lines = read_text_lines(path);
+  const std::size_t num_columns = lines.empty() ? 1 : split_words(lines.front().text).size();
+  if (num_columns < 2 || num_columns > 3) return {read_number_column(path, kQuantity), {}, {}};
+  TiltTable table;
+  std::map<std::int64_t, std::size_t> recorded;  // section by its number in the order of recording
+  for (const TextLine& line : lines) {
+    const auto words = split_words(line.text);
+    const bool has_columns = words.size() == num_columns;
+    const auto tilt = has_columns ? parse_number(words[0], base::kLargestAngle_deg) : std::nullopt;
+    const auto number = has_columns ? parse_integer(words[1]) : std::nullopt;
+    const auto dose = has_columns ? parse_number(words.back()) : std::nullopt;
+    if (!tilt || !number || !dose || !recorded.emplace(*number, table.angles.size()).second)
+      throw_line_error(path, line, kForm);
+    table.angles.push_back({*tilt, line.number});
+    if (num_columns == 3) table.doses.push_back(*dose);
+  }
+  const std::int64_t first = recorded.begin()->first, last = recorded.rbegin()->first;
+  if (first < 0 || first > 1 || last - first + 1 != std::ssize(recorded))
+    throw_line_error(path, lines.front(), kForm);
+  for (const auto& [number, section] : recorded) table.order.push_back(section);
+  return table;
 }
 
 std::vector<ImodTransform> read_imod_transforms(const std::filesystem::path& path) {
@@ -75,6 +106,20 @@ std::vector<ImodTransform> read_imod_transforms(const std::filesystem::path& pat
     }
   }
   return transforms;
+}
+
+std::string section_list(std::span<const std::int64_t> sections) {
+  std::vector<std::string> items;
+  for (std::size_t first = 0, last = 0; first < sections.size(); first = last + 1) {
+    last = first;
+    while (last + 1 < sections.size() && sections[last + 1] == sections[last] + 1) ++last;
+    if (last > first + 1) {
+      items.push_back(fmt::format("{}-{}", sections[first], sections[last]));
+    } else {
+      for (std::size_t i = first; i <= last; ++i) items.push_back(std::to_string(sections[i]));
+    }
+  }
+  return fmt::format("{}", fmt::join(items, ","));
 }
 
 std::vector<std::int64_t> parse_section_list(std::string_view text, std::int64_t num_sections) {

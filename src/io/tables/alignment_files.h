@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -26,6 +28,18 @@ struct NumberLine {
 std::vector<NumberLine> read_number_column(const std::filesystem::path& path,
                                            std::string_view quantity);
 
+/// The contents of a list of tilt angles, .tlt or .rawtlt, or of AreTomo 3's NAME_TLT.txt.
+struct TiltTable {
+  std::vector<NumberLine> angles;  ///< degrees, one a section
+  std::vector<std::size_t> order;  ///< sections in the order of recording; empty: not in the file
+  std::vector<double> doses;       ///< electrons / Å² of each section; empty: not in the file
+};
+
+/// Reads a list of tilt angles. A second column is the order of recording, from 0 or 1, and a third
+/// the dose of each section, as in AreTomo 3. Throws Error as read_number_column() does, and for a
+/// second column that is no order.
+TiltTable read_tilt_table(const std::filesystem::path& path);
+
 /// IMOD's transform from raw to aligned coordinates of one section: q = A p + shift, where p is
 /// relative to the centre of the raw image and q to the centre of the aligned one, in unbinned
 /// pixels.
@@ -47,29 +61,52 @@ struct MdocSection {
   std::optional<double> prior_dose;  ///< PriorRecordDose: electrons / Å² before this section
   std::optional<double> dose;        ///< ExposureDose: electrons / Å² of this section; 0: unknown
   std::optional<std::int64_t> time_s;  ///< DateTime, in seconds from some day on
+  std::optional<double> rotation_deg;  ///< RotationAngle
   std::string frame_name;              ///< SubFramePath without its folders
 };
 
 /// The tilt axis of the images, counter-clockwise from +Y, and the line that says so.
 using AxisAngle = NumberLine;
 
-/// The contents of SerialEM's .mdoc, with sections in ascending order of n.
+/// The contents of SerialEM's or Tomography's .mdoc, with sections in ascending order of n.
 struct Mdoc {
   std::optional<double> pixel_spacing_A;  ///< value of the series, or of its first section
-  /// "[T = Tilt axis angle = X]", else TiltAxisAngle. RotationAngle is another angle.
+  /// SerialEM's "[T = Tilt axis angle = X]", else what TiltAxisAngle and RotationAngle say together
+  /// (mdoc_axis.cc). RotationAngle alone is another angle.
   std::optional<AxisAngle> tilt_axis_deg;
+  /// A TiltAxisAngle of Tomography from which the axis cannot be told.
+  std::optional<AxisAngle> unclear_axis_deg;
+  std::optional<double> voltage_kV;
+  std::optional<std::array<std::int64_t, 2>> image_size_px;  ///< ImageSize: of what PixelSpacing is
   std::string image_file;  ///< ImageFile: the stack, without its folders
   std::vector<MdocSection> sections;
 };
+
+/// Returns what stands for the angle in SerialEM's title "Tilt axis angle = 85.9, binning = 1 …" of
+/// an .mdoc or of the header of a stack, and nothing for other titles.
+std::optional<std::string_view> axis_of_title(std::string_view title);
+/// Does the same for Tomography's title "TiltAxisAngle = -175.9  Binning = 1 …".
+std::optional<std::string_view> tomography_axis_of_title(std::string_view title);
+
+/// Sets the axis of an .mdoc from a TiltAxisAngle and the RotationAngle of its first section.
+/// Versions of Tomography write the former in three ways, which the latter tells apart, as in IMOD
+/// (header.f90). Without it the axis stays unclear if `is_title`, the form of Tomography, and is
+/// the angle itself otherwise.
+void set_axis_of_tomography(const AxisAngle& stated, bool is_title, Mdoc& mdoc);
 
 /// Reads an .mdoc file. Skips unknown keys, because SerialEM adds new ones every year. Throws Error
 /// for a section that comes twice.
 Mdoc read_mdoc(const std::filesystem::path& path);
 
-/// Returns the indices of the sections of an .mdoc in the order in which they were recorded: by
-/// DateTime, else by PriorRecordDose, else by their numbers. A key counts if all sections have it
-/// and no two are equal.
-std::vector<std::size_t> acquisition_order(const Mdoc& mdoc);
+/// The order in which the sections of an .mdoc were recorded.
+struct AcquisitionOrder {
+  std::vector<std::size_t> sections;  ///< indices into Mdoc::sections
+  bool is_stated = false;  ///< by a key; else sections count as recorded by their numbers
+};
+
+/// Returns the order by DateTime, else by PriorRecordDose, else by the numbers of the sections. A
+/// key counts if all sections have it and no two are equal.
+AcquisitionOrder acquisition_order(const Mdoc& mdoc);
 
 /// AreTomo's global alignment of one section: raw − centre = R(rotation) q + shift.
 struct AreTomoRow {
@@ -84,7 +121,8 @@ struct AreTomoRow {
 /// The contents of AreTomo's .aln file.
 struct AreTomoAlignment {
   std::optional<std::array<std::int64_t, 3>> raw_size;  ///< size of the stack that was aligned
-  std::vector<std::int64_t> dark_sections;              ///< second number of each # DarkFrame line
+  std::vector<std::int64_t> dark_places;                ///< first number of each # DarkFrame line
+  std::vector<std::int64_t> dark_sections;              ///< its second number
   std::vector<double> dark_tilt_deg;                    ///< its third number, if every line has one
   double alpha_offset_deg = 0.0;                        ///< already included in the rows' angles
   double beta_offset_deg = 0.0;
@@ -93,18 +131,25 @@ struct AreTomoAlignment {
   std::int64_t num_local_rows = 0;  ///< number of rows for patches, which are not used
 };
 
-/// Reads an .aln file. Rows of local alignments are counted and skipped.
-AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path);
+/// Reads an .aln file. Rows of local alignments are counted and skipped. Throws Error with the
+/// column for a number that cannot be; without `needs_tilt` such a tilt is 0, because another file
+/// has the tilts.
+AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path, bool needs_tilt = true);
 
 /// Returns the zero-based section of the stack for each row. AreTomo's versions count SEC from 0 or
 /// from 1, and before or after the removal of dark frames; the stack may also be the one before or
 /// after the removal. The only numbering in which all rows fit `num_sections` is taken. Where 0
-/// stands for the section of every dark frame, their tilts tell where they are among the rows.
+/// stands for the section of every dark frame, their places in the order of tilt, which count from
+/// 0, are their sections if the numbers of the rows agree (AreTomo 3's CDarkFrames::ToOneBased);
+/// else their tilts tell where they are among the rows.
 /// Throws Error with both numbers and both files if there is no such numbering.
 std::vector<std::int64_t> assign_aretomo_sections(const AreTomoAlignment& alignment,
                                                   const std::filesystem::path& aln,
                                                   std::int64_t num_sections,
                                                   const std::filesystem::path& stack);
+
+/// Writes ascending sections, counted from 1, as parse_section_list() reads them: "1-3,40".
+std::string section_list(std::span<const std::int64_t> sections);
 
 /// Parses "1-3,40" to {0, 1, 2, 39}: sorted zero-based sections, each once. Empty text gives none.
 /// Throws Error for sections outside 1…num_sections.

@@ -146,7 +146,7 @@ std::vector<std::size_t> order_of(const std::vector<std::string>& entries) {
   std::string text;
   for (std::size_t i = 0; i < entries.size(); ++i)
     text += "[ZValue = " + std::to_string(i) + "]\n" + entries[i] + "\n";
-  return acquisition_order(read_mdoc(scratch.write("a.mdoc", text)));
+  return acquisition_order(read_mdoc(scratch.write("a.mdoc", text))).sections;
 }
 
 TEST(Mdoc, OrderIsByTimeElseByDoseElseByNumber) {
@@ -213,13 +213,19 @@ TEST(AreTomoAlignment, ReadsHeaderGlobalAndLocalRows) {
 
 TEST(AreTomoAlignment, RefusesMalformedRows) {
   const ScratchDirectory scratch;
-  for (const std::string bad :
-       {"0 85 1 2 3 4 5 6 7", "x 85 1 0 0 0 0 0 0 10", "0 85 1 0 0 0 0 0 0 steep",
-        "-1 85 1 0 0 0 0 0 0 10", "0 1e300 1 0 0 0 0 0 0 10", "0 85 1 1e300 0 0 0 0 0 10",
-        "0 85 1 0 0 0 0 0 0 inf", "99999999999 85 1 0 0 0 0 0 0 10"}) {
+  const std::pair<std::string, std::string> rows[] = {
+      {"0 85 1 2 3 4 5 6 7", "0 85 1 2 3 4 5 6 7"},
+      {"x 85 1 0 0 0 0 0 0 10", "x 85 1"},
+      {"-1 85 1 0 0 0 0 0 0 10", "-1 85"},
+      {"99999999999 85 1 0 0 0 0 0 0 10", "99999999999 85"},
+      {"0 85 1 0 0 0 0 0 0 steep", "TILT of AreTomo's row is 'steep'"},
+      {"0 1e300 1 0 0 0 0 0 0 10", "ROT of AreTomo's row is '1e300'"},
+      {"0 85 1 1e300 0 0 0 0 0 10", "TX of AreTomo's row is '1e300'"},
+      {"0 85 1 0 0 0 0 0 0 inf", "TILT of AreTomo's row is 'inf'"}};
+  for (const auto& [bad, part] : rows) {
     const auto path = scratch.write("a.aln", aln_row(0) + bad + "\n");
     expect_parts(message_of<Error>([&] { read_aretomo_alignment(path); }),
-                 {"a.aln", "line 2", bad});
+                 {"a.aln", "line 2", part});
   }
   EXPECT_THROW(read_aretomo_alignment(scratch.write("a.aln", "# RawSize = 1 2 3\n")), Error);
   EXPECT_THROW(read_aretomo_alignment(scratch.write("a.aln", "# RawSize = 1 2\n" + aln_row(0))),
@@ -275,6 +281,103 @@ TEST(AreTomoSections, DarkFramesWithoutSectionsAreFoundByTilt) {
   EXPECT_THROW(assign_by_tilt({-18, 2, 22}, {1}, 1, 2), Error);
   EXPECT_THROW(assign_by_tilt({0, -20, 20}, {10}, 1), Error);
   EXPECT_THROW(assign_by_tilt({-20, 0, 20}, {20}, 1), Error);
+}
+
+// Assigns rows of rising tilts with these numbers, beside dark frames of which only the places are
+// known. The tilts of dark frames are also those of rows, so that they tell nothing.
+Sections assign_by_place(const Sections& numbers, const Sections& places) {
+  AreTomoAlignment alignment;
+  alignment.alpha_offset_deg = 4;
+  for (const auto number : numbers) {
+    alignment.rows.emplace_back();
+    alignment.rows.back().section = number;
+    alignment.rows.back().tilt_deg = 4.0 * static_cast<double>(alignment.rows.size());
+  }
+  for (const auto place : places) {
+    alignment.dark_places.push_back(place);
+    alignment.dark_sections.push_back(0);
+    alignment.dark_tilt_deg.push_back(4.0 * static_cast<double>(place));
+  }
+  return assign_aretomo_sections(alignment, "a.aln", std::ssize(numbers) + std::ssize(places), "a");
+}
+
+TEST(AreTomoSections, DarkFramesWithoutSectionsAreFoundByPlace) {
+  EXPECT_EQ(assign_by_place({1, 2, 4, 6}, {2, 4}), (Sections{0, 1, 3, 5}));
+  EXPECT_EQ(assign_by_place({0, 1, 3, 5}, {2, 4}), (Sections{0, 1, 3, 5}));
+  EXPECT_EQ(assign_by_place({1, 2, 3, 4}, {2, 4}), (Sections{0, 1, 3, 5}));  // after the removal
+  EXPECT_EQ(assign_by_place({2, 3, 4}, {0}), (Sections{1, 2, 3}));
+  EXPECT_THROW(assign_by_place({1, 2, 3, 4}, {2, 9}), Error);
+}
+
+TEST(AreTomoAlignment, NamesTheColumnThatCannotBe) {
+  const ScratchDirectory scratch;
+  const auto path =
+      scratch.write("a.aln", aln_row(0) + "1 85 1.0 3.5 -2 1 1 1 0 1567301525373690.0\n");
+  expect_parts(message_of<Error>([&] { read_aretomo_alignment(path); }),
+               {"a.aln", "line 2", "TILT", "'1567301525373690.0'", "--tlt"});
+  EXPECT_EQ(read_aretomo_alignment(path, /*needs_tilt=*/false).rows.size(), 2u);
+  const auto shifted = scratch.write("b.aln", aln_row(0) + "1 85 1.0 3.5 1e30 1 1 1 0 10\n");
+  expect_parts(message_of<Error>([&] { read_aretomo_alignment(shifted, false); }),
+               {"b.aln", "line 2", "TY", "'1e30'"});
+}
+
+TEST(TiltTable, ReadsTheColumnsOfAreTomo3) {
+  const ScratchDirectory scratch;
+  const TiltTable table = read_tilt_table(scratch.write(
+      "a_TLT.txt", "  -6.00     3      2.50\n   0.00     1      2.25\n   6.00     2      2.00\n"));
+  ASSERT_EQ(table.angles.size(), 3u);
+  EXPECT_EQ(table.angles[2].value, 6.0);
+  EXPECT_EQ(table.angles[2].line, 3);
+  EXPECT_EQ(table.order, (std::vector<std::size_t>{1, 2, 0}));
+  EXPECT_EQ(table.doses, (std::vector<double>{2.5, 2.25, 2.0}));
+  const TiltTable two = read_tilt_table(scratch.write("a.tlt", "-6 1\n0 0\n"));
+  EXPECT_EQ(two.order, (std::vector<std::size_t>{1, 0}));
+  EXPECT_TRUE(two.doses.empty());
+  EXPECT_TRUE(read_tilt_table(scratch.write("a.tlt", "-6\n0\n")).order.empty());
+  for (const char* bad : {"1 2\n3 4\n", "1 1\n3 1\n", "0 0.5\n1 1\n", "1 1 2\n1 2\n",
+                          "1 1 x\n2 2 1\n", "1 2 3 4\n2 3 4 5\n"})
+    expect_parts(message_of<Error>([&] { read_tilt_table(scratch.write("bad.tlt", bad)); }),
+                 {"bad.tlt", "line "});
+}
+
+TEST(SectionList, IsWrittenAsItIsRead) {
+  for (const char* text : {"1-3,40", "2", "1,2", "1-4,6,8-10", ""}) {
+    std::vector<std::int64_t> sections = parse_section_list(text, 50);
+    for (auto& section : sections) ++section;
+    EXPECT_EQ(section_list(sections), text);
+  }
+}
+
+TEST(Mdoc, ReadsTheAxisOfTomographyByRotationAngle) {
+  const ScratchDirectory scratch;
+  const auto read = [&](const char* axis, const std::string& rotation) {
+    return read_mdoc(scratch.write("a.mdoc", fmt::format("[T =   TiltAxisAngle = {}  Binning = 1  "
+                                                         "SpotSize = 6]\n[ZValue = 0]\n{}\n",
+                                                         axis, rotation)));
+  };
+  // The three relations of IMOD's header.f90.
+  EXPECT_EQ(read("-176.20", "RotationAngle = 86.20").tilt_axis_deg->value, 86.2);
+  EXPECT_EQ(read("86.2", "RotationAngle = 176.2").tilt_axis_deg->value, 86.2);
+  EXPECT_EQ(read("-86.2", "RotationAngle = 176.2").tilt_axis_deg->value, 86.2);
+  for (const char* rotation : {"", "RotationAngle = 20"}) {
+    const Mdoc unclear = read("-176.20", rotation);
+    EXPECT_FALSE(unclear.tilt_axis_deg);
+    EXPECT_EQ(unclear.unclear_axis_deg->value, -176.2);
+    EXPECT_EQ(unclear.unclear_axis_deg->line, 1);
+  }
+}
+
+TEST(Mdoc, ReadsTheMicroscope) {
+  const ScratchDirectory scratch;
+  const Mdoc mdoc = read_mdoc(
+      scratch.write("a.mdoc",
+                    "\xEF\xBB\xBFPixelSpacing = 5.4\r\nVoltage = 200\r\nImageSize = 1440 1023\r\n"
+                    "[ZValue = 0]\r\nTiltAngle = 3\r\n"));
+  EXPECT_EQ(mdoc.pixel_spacing_A, 5.4);
+  EXPECT_EQ(mdoc.voltage_kV, 200.0);
+  EXPECT_EQ(*mdoc.image_size_px, (std::array<std::int64_t, 2>{1440, 1023}));
+  EXPECT_EQ(mdoc.sections[0].tilt_deg, 3.0);
+  EXPECT_FALSE(read_mdoc(scratch.write("a.mdoc", "Voltage = 0\n[ZValue = 0]\n")).voltage_kV);
 }
 
 TEST(AreTomoSections, NeverAssumes) {

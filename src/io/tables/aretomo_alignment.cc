@@ -46,6 +46,7 @@ void parse_header_line(const std::filesystem::path& path, const TextLine& line,
     alignment->raw_size = {integer(0), integer(1), integer(2)};
   } else if (name == "DarkFrame") {
     require(2);
+    alignment->dark_places.push_back(integer(0));
     alignment->dark_sections.push_back(integer(1));
     if (numbers.size() > 2) alignment->dark_tilt_deg.push_back(numbers[2]);
   } else if (name == "AlphaOffset") {
@@ -60,31 +61,46 @@ void parse_header_line(const std::filesystem::path& path, const TextLine& line,
   }
 }
 
-AreTomoRow parse_row(const std::filesystem::path& path, const TextLine& line) {
+// The columns of a row that are used. The others are image statistics, which may be nan.
+struct Column {
+  std::string_view name;
+  std::size_t index;
+  double largest;
+};
+constexpr std::array<Column, 5> kUsedColumns{{{"ROT", 1, base::kLargestAngle_deg},
+                                              {"GMAG", 2, base::kLargestNumber},
+                                              {"TX", 3, base::kLargestPosition_px},
+                                              {"TY", 4, base::kLargestPosition_px},
+                                              {"TILT", 9, base::kLargestAngle_deg}}};
+
+// Parses a row. Without `needs_tilt` a tilt that cannot be is 0.
+AreTomoRow parse_row(const std::filesystem::path& path, const TextLine& line, bool needs_tilt) {
   constexpr std::size_t kColumns = 10;  // SEC ROT GMAG TX TY SMEAN SFIT SCALE BASE TILT
   const std::vector<std::string_view> words = split_words(line.text);
   const auto section = words.empty() ? std::nullopt : parse_integer(words.front());
-  // The middle columns are image statistics, which may be nan and are not used.
-  std::array<double, 5> used{};
-  constexpr std::array<std::size_t, 5> kUsedColumns{1, 2, 3, 4, 9};
-  constexpr std::array<double, 5> kLargest{base::kLargestAngle_deg, base::kLargestNumber,
-                                           base::kLargestPosition_px, base::kLargestPosition_px,
-                                           base::kLargestAngle_deg};
-  bool is_valid = words.size() == kColumns && section && *section >= 0;
-  for (std::size_t i = 0; is_valid && i < used.size(); ++i) {
-    const auto number = parse_number(words[kUsedColumns[i]], kLargest[i]);
-    is_valid = number.has_value();
-    used[i] = number.value_or(0.0);
-  }
-  if (!is_valid) {
+  if (words.size() != kColumns || !section || *section < 0) {
     throw_row_error(path, line, "a row of AreTomo: SEC ROT GMAG TX TY SMEAN SFIT SCALE BASE TILT");
+  }
+  std::array<double, kUsedColumns.size()> used{};
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    const auto& [name, index, largest] = kUsedColumns[i];
+    const auto number = parse_number(words[index], largest);
+    if (!number && (needs_tilt || name != "TILT")) {
+      throw Error(
+          fmt::format("'{}', line {}: the column {} of AreTomo's row is '{}', and a number from "
+                      "-{:g} to {:g} is "
+                      "expected{}",
+                      path.string(), line.number, name, words[index], largest, largest,
+                      name == "TILT" ? ": correct it, or give the angles with --tlt" : ""));
+    }
+    used[i] = number.value_or(0.0);
   }
   return {*section, line.number, used[0], used[1], used[2], used[3], used[4]};
 }
 
 }  // namespace
 
-AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path) {
+AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path, bool needs_tilt) {
   AreTomoAlignment alignment;
   bool is_local_part = false;
   for (const TextLine& line : read_text_lines(path)) {
@@ -94,7 +110,7 @@ AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path) {
     } else if (is_local_part) {
       ++alignment.num_local_rows;
     } else {
-      alignment.rows.push_back(parse_row(path, line));
+      alignment.rows.push_back(parse_row(path, line, needs_tilt));
     }
   }
   if (alignment.rows.empty()) {

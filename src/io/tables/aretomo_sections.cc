@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -70,17 +71,62 @@ std::optional<Sections> place_by_tilt(const AreTomoAlignment& alignment, double 
   return sections;
 }
 
-// Returns the sections of the rows in a complete stack, where only tilts tell the dark frames.
+// Tells whether the tilts of the rows rise, or fall, with SEC, as in AreTomo 3's stacks.
+bool are_sorted_by_tilt(const AreTomoAlignment& alignment) {
+  std::vector<double> tilts_deg;
+  for (const std::int64_t row : rows_by_number(alignment))
+    tilts_deg.push_back(alignment.rows[static_cast<std::size_t>(row)].tilt_deg);
+  return std::ranges::is_sorted(tilts_deg) ||
+         std::ranges::is_sorted(tilts_deg, std::ranges::greater());
+}
+
+// Returns the sections of the rows in a complete stack by the places of the dark frames in the
+// order of tilt, or nothing if the rows are in another order or the places cannot be.
+std::optional<Sections> place_beside_dark(const AreTomoAlignment& alignment) {
+  const auto num_sections = std::ssize(alignment.rows) + std::ssize(alignment.dark_sections);
+  if (std::ssize(alignment.dark_places) != std::ssize(alignment.dark_sections) ||
+      !are_sorted_by_tilt(alignment))
+    return std::nullopt;
+  const Sections kept = all_but(alignment.dark_places, 0, num_sections);
+  if (kept.size() != alignment.rows.size()) return std::nullopt;
+  const Sections order = rows_by_number(alignment);
+  Sections sections(order.size());
+  for (std::size_t rank = 0; rank < order.size(); ++rank)
+    sections[static_cast<std::size_t>(order[rank])] = kept[rank];
+  return sections;
+}
+
+// Returns the sections of the rows in a complete stack, where the numbers of the rows do not tell
+// the dark frames.
 Sections sections_beside_unknown_dark(const AreTomoAlignment& alignment,
                                       const std::filesystem::path& aln) {
   // It is not said whether the tilts of dark frames include the offset, so both must agree.
   const auto sections = place_by_tilt(alignment, 0.0);
   if (sections && sections == place_by_tilt(alignment, alignment.alpha_offset_deg))
     return *sections;
+  if (const auto by_place = place_beside_dark(alignment)) return *by_place;
   throw Error(fmt::format(
       "'{}' has dark frames without their sections, and their tilts do not say where they are "
       "among the rows: give the stack without the dark frames",
       aln.string()));
+}
+
+// Returns the places of dark frames in the order of tilt, which are their sections where the
+// numbers of the rows are those that are missing among them, counted from 0 or 1. Else returns
+// nothing.
+std::optional<Sections> dark_sections_by_place(const AreTomoAlignment& alignment,
+                                               const std::set<std::int64_t>& numbers) {
+  const std::size_t total = alignment.rows.size() + alignment.dark_sections.size();
+  if (alignment.dark_places.size() != alignment.dark_sections.size()) return std::nullopt;
+  for (const std::int64_t base : {0, 1}) {
+    std::set<std::int64_t> all = numbers;
+    for (const std::int64_t place : alignment.dark_places) all.insert(place + base);
+    if (!are_consecutive(all, base, total)) continue;
+    Sections sections = alignment.dark_places;
+    for (std::int64_t& section : sections) section += base;
+    return sections;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -102,11 +148,18 @@ Sections assign_aretomo_sections(const AreTomoAlignment& alignment,
   }
   std::set<std::int64_t> numbers;
   for (const AreTomoRow& row : rows) numbers.insert(row.section);
-  const bool has_unknown_dark = has_unknown_dark_sections(alignment);
+  Sections dark_sections = alignment.dark_sections;
+  bool has_unknown_dark = has_unknown_dark_sections(alignment);
+  if (has_unknown_dark) {
+    if (const auto found = dark_sections_by_place(alignment, numbers)) {
+      dark_sections = *found;
+      has_unknown_dark = false;
+    }
+  }
   if (has_unknown_dark && stack_is_complete && numbers.size() == rows.size())
     return sections_beside_unknown_dark(alignment, aln);
   std::set<std::int64_t> with_dark = numbers;
-  with_dark.insert(alignment.dark_sections.begin(), alignment.dark_sections.end());
+  with_dark.insert(dark_sections.begin(), dark_sections.end());
   const auto total = rows.size() + alignment.dark_sections.size();
 
   // The numbering is from before the removal if rows and dark frames together are complete, and
@@ -132,7 +185,7 @@ Sections assign_aretomo_sections(const AreTomoAlignment& alignment,
   // in a complete one it gives the place among the sections that are not dark.
   Sections kept(rows.size());
   std::iota(kept.begin(), kept.end(), 0);
-  if (stack_is_complete) kept = all_but(alignment.dark_sections, *numbers.begin(), num_sections);
+  if (stack_is_complete) kept = all_but(dark_sections, *numbers.begin(), num_sections);
   if (kept.size() != rows.size()) {
     throw Error(
         fmt::format("'{}': the numbers of the dark frames do not fit the {} sections of '{}'",

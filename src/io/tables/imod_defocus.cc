@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "io/saving/atomic_file.h"
 #include "io/tables/ctf_table.h"
@@ -74,6 +75,7 @@ Form form_of(const std::filesystem::path& path, const TextLine& first) {
 
 struct Entry {
   std::int64_t first_view = 0, last_view = 0;  // from 0
+  double tilt_deg = 0.0;                       // the mean of their angles
   Defocus defocus;
 };
 
@@ -108,7 +110,7 @@ Entry parse_entry(const std::filesystem::path& path, const TextLine& line, const
     const double phase = std::abs(values[has_astigmatism ? 7 : 5]);  // as IMOD does
     defocus.phase_shift_deg = form.has(kPhaseInRadians) ? phase / kRadians : phase;
   }
-  return {first - 1, last - 1, defocus};
+  return {first - 1, last - 1, (values[2] + values[3]) / 2, defocus};
 }
 
 // Returns a defocus for each view. As in IMOD, a line of the file is about the middle view of its
@@ -154,12 +156,16 @@ CtfTable read_imod_defocus(const std::filesystem::path& path) {
                                 (form.has(kHasPhase) ? 1 : 0) + (form.has(kHasCutOn) ? 1 : 0);
   std::map<std::int64_t, Defocus> at_middle;
   std::int64_t num_views = 0;
+  std::vector<std::optional<double>> tilts;  // of views with a line of their own
   for (const TextLine& line : lines) {
     const Entry entry = parse_entry(path, line, form, num_words);
     at_middle[(entry.first_view + entry.last_view) / 2] = entry.defocus;
     num_views = std::max(num_views, entry.last_view + 1);
+    tilts.resize(static_cast<std::size_t>(num_views));
+    if (entry.first_view == entry.last_view)
+      tilts[static_cast<std::size_t>(entry.first_view)] = entry.tilt_deg;
   }
-  CtfTable table{path, interpolated(at_middle, num_views), {}, {}};
+  CtfTable table{path, interpolated(at_middle, num_views), {}, {}, std::move(tilts), true};
   if (form.has(kHasCutOn))
     table.not_applied.emplace_back("the cut-on frequencies of the phase plate");
   return table;

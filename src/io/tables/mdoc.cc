@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "io/named_file.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -33,23 +34,49 @@ double require_number(const std::filesystem::path& path, const TextLine& line,
                           path.string(), line.number, quote(line.text), largest, largest));
 }
 
-// Returns what a path, of Windows or of Unix, names in its folder.
-std::string without_folders(std::string_view path) {
-  return std::string(path.substr(path.find_last_of("/\\") + 1));
+// The angles of a tilt axis that an .mdoc has, before it is known what they mean.
+struct StatedAxes {
+  std::optional<AxisAngle> serialem, tomography, entry;
+};
+
+// Notes the angle of "[T = Tilt axis angle = 85.9, binning = 1 …]" and of Tomography's
+// "[T = TiltAxisAngle = -175.9 …]". Other titles have none.
+void read_title(const std::filesystem::path& path, const TextLine& line, StatedAxes& axes) {
+  if (!line.text.starts_with("[T")) return;
+  const auto angle = [&](std::string_view word) {
+    return AxisAngle{require_number(path, line, word, base::kLargestAngle_deg), line.number};
+  };
+  if (const auto word = axis_of_title(line.text)) axes.serialem = angle(*word);
+  if (const auto word = tomography_axis_of_title(line.text)) axes.tomography = angle(*word);
 }
 
-// Returns the angle of "[T = Tilt axis angle = 85.9, binning = 1 …]", and nothing for other
-// titles.
-std::optional<double> axis_of_title(const std::filesystem::path& path, const TextLine& line) {
-  constexpr std::string_view kKey = "ilt axis angle";
-  const std::string_view text = line.text;
-  const std::size_t key = text.find(kKey);
-  if (!text.starts_with("[T") || key == std::string_view::npos) return std::nullopt;
-  const std::size_t equals = text.find('=', key);
-  if (equals == std::string_view::npos) return std::nullopt;
-  const std::string_view value = trim(text.substr(equals + 1));
-  return require_number(path, line, value.substr(0, value.find_first_of(" ,]\t")),
-                        base::kLargestAngle_deg);
+// Sets the axis of the first of the angles there are.
+void choose_axis(const StatedAxes& axes, Mdoc& mdoc) {
+  if (axes.serialem) {
+    mdoc.tilt_axis_deg = axes.serialem;
+  } else if (axes.tomography) {
+    set_axis_of_tomography(*axes.tomography, /*is_title=*/true, mdoc);
+  } else if (axes.entry) {
+    set_axis_of_tomography(*axes.entry, /*is_title=*/false, mdoc);
+  }
+}
+
+// Returns a voltage that a microscope can have, or nothing. SerialEM writes 0 or -1 if it does not
+// know it.
+std::optional<double> parse_voltage_kV(std::string_view text) {
+  constexpr double kLowest_kV = 20, kHighest_kV = 3000;
+  const auto voltage_kV = parse_number(text);
+  if (!voltage_kV || *voltage_kV < kLowest_kV || *voltage_kV > kHighest_kV) return std::nullopt;
+  return voltage_kV;
+}
+
+// Reads two whole numbers, as of ImageSize.
+std::optional<std::array<std::int64_t, 2>> parse_size(std::string_view text) {
+  const auto words = split_words(text);
+  if (words.size() != 2) return std::nullopt;
+  const auto width = parse_integer(words[0]), height = parse_integer(words[1]);
+  if (!width || !height || *width < 1 || *height < 1) return std::nullopt;
+  return std::array{*width, *height};
 }
 
 // Returns n of "[ZValue = n]", and nothing for other heads such as "[T = …]" and
@@ -143,6 +170,8 @@ void read_section_entry(const std::filesystem::path& path, const TextLine& line,
     section->dose = require_dose(path, line, entry);
   } else if (entry.key == "DateTime") {
     section->time_s = parse_time(entry.value);
+  } else if (entry.key == "RotationAngle") {
+    section->rotation_deg = parse_number(entry.value, base::kLargestAngle_deg);
   } else if (entry.key == "SubFramePath") {
     section->frame_name = without_folders(entry.value);
   }
@@ -166,6 +195,7 @@ std::optional<std::vector<std::size_t>> order_by(const std::vector<MdocSection>&
 
 Mdoc read_mdoc(const std::filesystem::path& path) {
   Mdoc mdoc;
+  StatedAxes axes;
   bool is_in_section = false;
   for (const TextLine& line : read_text_lines(path)) {
     if (line.text.starts_with('[')) {
@@ -176,8 +206,7 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
         mdoc.sections.back().section = *section;
         mdoc.sections.back().line = line.number;
       }
-      if (const auto axis_deg = axis_of_title(path, line))
-        mdoc.tilt_axis_deg = AxisAngle{*axis_deg, line.number};
+      read_title(path, line, axes);
       is_in_section = is_in_section || section.has_value();
       continue;
     }
@@ -188,11 +217,15 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
       if (is_in_section) mdoc.sections.back().pixel_spacing_A = spacing_A;
     } else if (entry.key == "TiltAxisAngle") {
       const double axis_deg = require_number(path, line, entry.value, base::kLargestAngle_deg);
-      if (!mdoc.tilt_axis_deg) mdoc.tilt_axis_deg = AxisAngle{axis_deg, line.number};
+      if (!axes.entry) axes.entry = AxisAngle{axis_deg, line.number};
+    } else if (entry.key == "Voltage" && !mdoc.voltage_kV) {
+      mdoc.voltage_kV = parse_voltage_kV(entry.value);
     } else if (is_in_section) {
       read_section_entry(path, line, entry, &mdoc.sections.back());
     } else if (entry.key == "ImageFile") {
       mdoc.image_file = without_folders(entry.value);
+    } else if (entry.key == "ImageSize") {
+      mdoc.image_size_px = parse_size(entry.value);
     }
   }
   if (mdoc.sections.empty()) {
@@ -200,14 +233,16 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
                             path.string()));
   }
   sort_and_require_unique(path, &mdoc);
+  choose_axis(axes, mdoc);
   return mdoc;
 }
 
-std::vector<std::size_t> acquisition_order(const Mdoc& mdoc) {
-  if (auto by_time = order_by(mdoc.sections, &MdocSection::time_s)) return *by_time;
-  if (auto by_dose = order_by(mdoc.sections, &MdocSection::prior_dose)) return *by_dose;
-  std::vector<std::size_t> as_numbered(mdoc.sections.size());
-  std::iota(as_numbered.begin(), as_numbered.end(), 0);
+AcquisitionOrder acquisition_order(const Mdoc& mdoc) {
+  if (auto by_time = order_by(mdoc.sections, &MdocSection::time_s)) return {*by_time, true};
+  if (auto by_dose = order_by(mdoc.sections, &MdocSection::prior_dose)) return {*by_dose, true};
+  AcquisitionOrder as_numbered;
+  as_numbered.sections.resize(mdoc.sections.size());
+  std::iota(as_numbered.sections.begin(), as_numbered.sections.end(), 0);
   return as_numbered;
 }
 

@@ -21,7 +21,10 @@ namespace {
 
 bool is_image(const fs::path& path) {
   constexpr std::array<std::string_view, 3> kExtensions{".mrc", ".tif", ".tiff"};
-  return std::ranges::find(kExtensions, path.extension().string()) != kExtensions.end();
+  std::string extension = path.extension().string();
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::ranges::find(kExtensions, extension) != kExtensions.end();
 }
 
 // Returns the images in a folder, sorted by name.
@@ -37,21 +40,35 @@ std::vector<fs::path> images_in(const fs::path& folder) {
   return images;
 }
 
-// Finds the image of a movie: the one with its name, else the only one whose name goes on after
-// it. "TS_1" does not go on as "TS_12".
+// Returns a name as it is compared: without differences of upper and lower case, and with the
+// underscores that RELION writes for points.
+std::string comparable(std::string name) {
+  std::ranges::transform(name, name.begin(), [](unsigned char c) {
+    return c == '.' ? '_' : static_cast<char>(std::tolower(c));
+  });
+  return name;
+}
+
+// Finds the image of a movie: the one with its name, else the only one whose name is comparable,
+// else the only one whose name goes on after it. "TS_1" does not go on as "TS_12".
 fs::path find_image(const std::string& movie, const std::vector<fs::path>& images,
                     const std::string& section) {
   const std::string stem = fs::path(movie).stem().string();
-  std::vector<fs::path> longer;
+  const std::string wanted = comparable(stem);
+  std::vector<fs::path> same, longer;
   for (const fs::path& image : images) {
-    const std::string name = image.stem().string();
-    if (name == stem) return image;
-    const bool goes_on =
-        name.starts_with(stem) && std::isalnum(static_cast<unsigned char>(name[stem.size()])) == 0;
-    if (goes_on) longer.push_back(image);
+    if (image.stem().string() == stem) return image;
+    const std::string name = comparable(image.stem().string());
+    if (name == wanted) {
+      same.push_back(image);
+    } else if (name.starts_with(wanted) &&
+               std::isalnum(static_cast<unsigned char>(name[wanted.size()])) == 0) {
+      longer.push_back(image);
+    }
   }
-  if (longer.size() == 1) return longer.front();
-  if (longer.empty()) {
+  const std::vector<fs::path>& found = same.empty() ? longer : same;
+  if (found.size() == 1) return found.front();
+  if (found.empty()) {
     throw Error(
         fmt::format("{} is of the movie '{}', and no image in its folder is named after it "
                     "('{}.mrc' or .tif)",
@@ -60,7 +77,7 @@ fs::path find_image(const std::string& movie, const std::vector<fs::path>& image
   throw Error(
       fmt::format("{} is of the movie '{}', and several images are named after it, such as "
                   "'{}' and '{}': leave one of them in the folder",
-                  section, movie, longer[0].filename().string(), longer[1].filename().string()));
+                  section, movie, found[0].filename().string(), found[1].filename().string()));
 }
 
 }  // namespace

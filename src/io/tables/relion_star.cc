@@ -11,6 +11,7 @@ namespace tomofield::io {
 namespace {
 
 constexpr double kLargestShift_A = base::kLargestPosition_px;
+constexpr const char* kNominalTilt = "rlnTomoNominalStageTiltAngle";
 
 std::optional<std::array<std::int64_t, 3>> size_of(const StarRow& row) {
   std::array<std::int64_t, 3> size{};
@@ -53,6 +54,14 @@ const StarTable& rows_of_views(const std::filesystem::path& path,
                                const std::vector<StarTable>& tables) {
   const StarTable* const table = find_table(tables, "rlnMicrographName");
   if (table != nullptr) return *table;
+  if (find_table(tables, "rlnTomoProjX") != nullptr) {
+    throw Error(fmt::format(
+        "'{}' has projection matrices (_rlnTomoProjX) in place of tilt series, as RELION 4 and "
+        "Warp's "
+        "export of particles write them: give Warp's XML file or .tomostar, the tomograms.star of "
+        "RELION 5, or the stack with --xf and --tlt",
+        path.string()));
+  }
   throw Error(fmt::format(
       "'{}' has no column _rlnMicrographName, so it is no tilt series of RELION 5", path.string()));
 }
@@ -61,16 +70,22 @@ StatedOptics optics_of(const std::filesystem::path& path, const std::vector<Star
   return optics_by([&](const char* column) { return first_number(path, tables, column); });
 }
 
-ListedView view_of(const StarRow& row) {
+ListedView view_of(const StarRow& row, bool is_nominal) {
   ListedView view;
   view.image = row.text("rlnMicrographName");
   view.even = row.find_text("rlnMicrographNameEven").value_or("");
   view.odd = row.find_text("rlnMicrographNameOdd").value_or("");
-  view.tilt_deg = row.number("rlnTomoYTilt", base::kLargestAngle_deg);
-  view.x_tilt_deg = row.find_number("rlnTomoXTilt", base::kLargestAngle_deg).value_or(0.0);
-  view.rotation_deg = row.number("rlnTomoZRot", base::kLargestAngle_deg);
-  view.shift_x_A = row.number("rlnTomoXShiftAngst", kLargestShift_A);
-  view.shift_y_A = row.number("rlnTomoYShiftAngst", kLargestShift_A);
+  if (is_nominal) {
+    view.tilt_deg = row.number(kNominalTilt, base::kLargestAngle_deg);
+    view.rotation_deg =
+        row.find_number("rlnTomoNominalTiltAxisAngle", base::kLargestAngle_deg).value_or(0.0);
+  } else {
+    view.tilt_deg = row.number("rlnTomoYTilt", base::kLargestAngle_deg);
+    view.x_tilt_deg = row.find_number("rlnTomoXTilt", base::kLargestAngle_deg).value_or(0.0);
+    view.rotation_deg = row.number("rlnTomoZRot", base::kLargestAngle_deg);
+    view.shift_x_A = row.number("rlnTomoXShiftAngst", kLargestShift_A);
+    view.shift_y_A = row.number("rlnTomoYShiftAngst", kLargestShift_A);
+  }
   view.dose_before = row.find_dose("rlnMicrographPreExposure");
   view.defocus = defocus_of(row);
   return view;
@@ -126,15 +141,20 @@ void set_relion_alignment(const ListedView& view, std::size_t row, StarTable& ta
 ViewTable read_relion_views(const std::filesystem::path& path) {
   const std::vector<StarTable> tables = read_star_file(path);
   const StarTable& table = rows_of_views(path, tables);
-  if (!table.has_column("rlnTomoYTilt")) {
+  const bool is_nominal = !table.has_column("rlnTomoYTilt") && table.has_column(kNominalTilt);
+  if (!table.has_column("rlnTomoYTilt") && !is_nominal) {
     throw Error(
         fmt::format("'{}' has no column _rlnTomoYTilt, so the tilt series is not aligned "
                     "yet: give the table that RELION's job 'Align tilt-series' wrote",
                     path.string()));
   }
-  ViewTable views{path, CentreRule::kWholePixel, false, {}, {}, {}, optics_of(path, tables)};
+  ViewTable views;
+  views.file = path;
+  views.centre = CentreRule::kWholePixel;
+  views.is_nominal = is_nominal;
+  views.optics = optics_of(path, tables);
   for (std::size_t i = 0; i < table.num_rows(); ++i)
-    views.views.push_back(view_of(StarRow(path, table, i)));
+    views.views.push_back(view_of(StarRow(path, table, i), is_nominal));
   return views;
 }
 
@@ -148,8 +168,14 @@ CtfTable read_relion_ctf(const std::filesystem::path& path) {
         path.string()));
   }
   CtfTable ctf{path, {}, optics_of(path, tables), {}};
-  for (std::size_t i = 0; i < table->num_rows(); ++i)
-    ctf.views.push_back(defocus_of(StarRow(path, *table, i)));
+  for (std::size_t i = 0; i < table->num_rows(); ++i) {
+    const StarRow row(path, *table, i);
+    ctf.views.push_back(defocus_of(row));
+    ctf.tilt_deg.push_back(
+        row.find_number("rlnTomoNominalStageTiltAngle", base::kLargestAngle_deg));
+    if (!ctf.tilt_deg.back())
+      ctf.tilt_deg.back() = row.find_number("rlnTomoYTilt", base::kLargestAngle_deg);
+  }
   return ctf;
 }
 

@@ -12,6 +12,7 @@
 namespace tomofield::io {
 namespace {
 
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // of UTF-8, as Windows writes it
 constexpr std::string_view kWhiteSpace = " \t\r\n\v\f";
 // A fiducial model with 1,000 points in each of 200 sections has 8 MiB and 200,000 lines.
 constexpr std::int64_t kLargestTextFile = std::int64_t{16} << 20;
@@ -47,6 +48,7 @@ std::string read_small_file(const std::filesystem::path& path) {
 std::string read_text_file(const std::filesystem::path& path) {
   std::string text = read_small_file(path);
   if (text.find('\0') != std::string::npos) throw_no_text(path, std::ssize(text));
+  if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
   return text;
 }
 

@@ -15,7 +15,7 @@ namespace tomofield::io {
 /// would never end), or is larger than the text files of any series.
 std::string read_small_file(const std::filesystem::path& path);
 
-/// Does the same for a text file, and refuses one with zero bytes.
+/// Does the same for a text file, without a byte order mark, and refuses one with zero bytes.
 std::string read_text_file(const std::filesystem::path& path);
 
 /// One line of a text file, without white space at its ends; `number` counts from 1.

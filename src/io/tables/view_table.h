@@ -60,6 +60,8 @@ struct ViewTable {
   /// 1 or −1: the right or the left side of an aligned view at a positive tilt_deg is farther from
   /// focus. None if the file does not say.
   std::optional<int> defocus_hand{};
+  /// The views are not aligned yet: the angles are the nominal ones of the microscope.
+  bool is_nominal = false;
 };
 
 /// Returns true if every view of a table that is used has a defocus.

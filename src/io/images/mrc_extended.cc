@@ -1,0 +1,193 @@
+#include "io/images/mrc_extended.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "base/plausible.h"
+
+namespace tomofield::io {
+namespace {
+
+// Of IMOD and SerialEM: two 16-bit numbers, whose meaning depends on the layout.
+constexpr std::size_t kFirstShort = 128, kSecondShort = 130;
+constexpr double kLargestTilt_deg = 180.0;
+constexpr double kAngstroms_in_m = 1e10;
+
+// Returns the number at an offset in a file of either byte order.
+template <typename T>
+T number_at(std::span<const std::byte> bytes, std::int64_t offset, bool is_swapped) {
+  std::array<std::byte, sizeof(T)> raw;
+  std::copy_n(bytes.begin() + offset, sizeof(T), raw.begin());
+  if (is_swapped) std::ranges::reverse(raw);
+  return std::bit_cast<T>(raw);
+}
+
+// Returns the bytes a section that SerialEM's flags announce (IMOD's description of the header).
+int bytes_of_section_flags(int flags) {
+  int bytes = 0;
+  constexpr std::array<int, 6> kBytesOfFlag{2, 6, 4, 2, 2, 4};
+  for (std::size_t bit = 0; bit < kBytesOfFlag.size(); ++bit) {
+    if ((flags >> bit) & 1) bytes += kBytesOfFlag[bit];
+  }
+  return bytes;
+}
+
+// Takes the angles of all sections, if every one of them can be. Equal ones are not those of a tilt
+// series: records without a tilt have 0.
+void take_tilts(std::vector<double> tilts_deg, MrcHeader& header) {
+  const bool are_angles = std::ranges::all_of(
+      tilts_deg, [](double tilt) { return base::is_plausible(tilt, kLargestTilt_deg); });
+  const bool differ =
+      std::ranges::any_of(tilts_deg, [&](double tilt) { return tilt != tilts_deg.front(); });
+  if (are_angles && differ) header.extended_tilt_deg = std::move(tilts_deg);
+}
+
+void take_pixel_size(double size_A, MrcHeader& header) {
+  const bool has_one = header.voxel_size_A[0] != 0.0 && header.voxel_size_A[0] != 1.0;
+  if (!has_one && base::is_plausible_pixel_size(size_A)) header.voxel_size_A.fill(size_A);
+}
+
+void take_axis(double axis_deg, MrcHeader& header) {
+  if (base::is_plausible(axis_deg, base::kLargestAngle_deg))
+    header.extended_axis_deg = std::remainder(axis_deg, 360.0);
+}
+
+void read_serialem(std::span<const std::byte> extended, const ExtendedRecords& records,
+                   MrcHeader& header) {
+  std::vector<double> tilts_deg;
+  for (std::int64_t section = 0; section < header.nz; ++section)
+    tilts_deg.push_back(number_at<std::int16_t>(extended, section * records.bytes_per_section,
+                                                header.is_byte_swapped) /
+                        100.0);
+  header.extended_tilt_deg = std::move(tilts_deg);
+}
+
+void read_floats(std::span<const std::byte> extended, const ExtendedRecords& records,
+                 MrcHeader& header) {
+  constexpr std::int64_t kAxis = 10, kPixel = 11;
+  const auto value = [&](std::int64_t section, std::int64_t index) {
+    return static_cast<double>(number_at<float>(
+        extended, section * records.bytes_per_section + records.first_float + 4 * index,
+        header.is_byte_swapped));
+  };
+  std::vector<double> tilts_deg;
+  for (std::int64_t section = 0; section < header.nz; ++section)
+    tilts_deg.push_back(value(section, 0));
+  take_tilts(std::move(tilts_deg), header);
+  if (records.num_floats <= kPixel) return;
+  take_axis(records.is_fei ? -value(0, kAxis) : value(0, kAxis), header);
+  constexpr double kSmallest_A = 0.05;  // a smaller number is in metres
+  const double pixel = value(0, kPixel);
+  take_pixel_size(pixel > kSmallest_A ? pixel : kAngstroms_in_m * pixel, header);
+}
+
+// One record of FEI1 or FEI2.
+class FeiRecord {
+ public:
+  static constexpr std::int64_t kSmallest = 172;  // bytes up to the pixel size
+
+  FeiRecord(std::span<const std::byte> bytes, bool is_swapped)
+      : bytes_(bytes), is_swapped_(is_swapped) {}
+
+  std::int64_t size() const { return number_at<std::int32_t>(bytes_, 0, is_swapped_); }
+  std::optional<double> tilt_deg() const { return angle(kTilt); }
+  // FEI's angle of the axis has the opposite sign of IMOD's.
+  std::optional<double> axis_deg() const {
+    const auto found = angle(kAxis);
+    return found ? std::optional(-*found) : std::nullopt;
+  }
+  std::optional<double> pixel_size_A() const {
+    const auto size_m = value(kPixel);
+    return size_m ? std::optional(kAngstroms_in_m * *size_m) : std::nullopt;
+  }
+
+ private:
+  struct Field {
+    std::int64_t offset;
+    int bit;  // of the first mask
+  };
+  static constexpr Field kTilt{100, 7}, kAxis{140, 12}, kPixel{156, 14};
+
+  std::optional<double> value(Field field) const {
+    const auto mask = number_at<std::uint32_t>(bytes_, 8, is_swapped_);
+    if (((mask >> field.bit) & 1u) == 0) return std::nullopt;
+    return number_at<double>(bytes_, field.offset, is_swapped_);
+  }
+  // One version of FEI's software has written radians (IMOD's getFeiExtHeadAngleScale).
+  std::optional<double> angle(Field field) const {
+    constexpr std::string_view kOfRadians("4.4.0.4981\0", 11);
+    constexpr std::size_t kVersion = 68;
+    const std::string_view text(reinterpret_cast<const char*>(bytes_.data()), bytes_.size());
+    const auto found = value(field);
+    if (!found || text.substr(kVersion, kOfRadians.size()) != kOfRadians) return found;
+    return *found * 180.0 / std::numbers::pi;
+  }
+
+  std::span<const std::byte> bytes_;
+  bool is_swapped_;
+};
+
+void read_fei(std::span<const std::byte> extended, MrcHeader& header) {
+  std::vector<double> tilts_deg;
+  for (std::size_t at = 0; std::ssize(tilts_deg) < header.nz;) {
+    if (at + FeiRecord::kSmallest > extended.size()) return;
+    const FeiRecord record(extended.subspan(at), header.is_byte_swapped);
+    const auto tilt_deg = record.tilt_deg();
+    if (!tilt_deg || record.size() < FeiRecord::kSmallest) return;
+    tilts_deg.push_back(*tilt_deg);
+    at += static_cast<std::size_t>(record.size());
+  }
+  take_tilts(std::move(tilts_deg), header);
+  const FeiRecord first(extended, header.is_byte_swapped);
+  if (const auto size_A = first.pixel_size_A()) take_pixel_size(*size_A, header);
+  if (const auto axis_deg = first.axis_deg()) take_axis(*axis_deg, header);
+}
+
+}  // namespace
+
+ExtendedRecords find_extended_records(const MrcHeaderBytes& bytes, const MrcHeader& header) {
+  const std::int64_t first = number_at<std::int16_t>(bytes, kFirstShort, header.is_byte_swapped);
+  const std::int64_t second = number_at<std::int16_t>(bytes, kSecondShort, header.is_byte_swapped);
+  const std::string& type = header.extended_header_type;
+  const auto fits = [&](std::int64_t record) {
+    return record > 0 && record * header.nz <= header.extended_header_bytes;
+  };
+  if (type == "FEI1" || type == "FEI2") return {.layout = ExtendedLayout::kFei};
+  // Files older than the type code are recognised by sizes that agree.
+  const bool is_serialem =
+      type == "SERI" || (type.empty() && first == bytes_of_section_flags(static_cast<int>(second)));
+  if (is_serialem) {
+    if (!(second & 1) || first < 2 || !fits(first)) return {};
+    return {.layout = ExtendedLayout::kSerialEm, .bytes_per_section = first};
+  }
+  if ((!type.empty() && type != "AGAR") || first < 0 || second < 1) return {};
+  const std::int64_t record = 4 * (first + second);
+  if (!fits(record)) return {};
+  return {.layout = ExtendedLayout::kFloats,
+          .bytes_per_section = record,
+          .first_float = 4 * first,
+          .num_floats = second,
+          .is_fei = !header.labels.empty() && header.labels.front().starts_with("Fei ")};
+}
+
+void read_extended_records(std::span<const std::byte> extended, const ExtendedRecords& records,
+                           MrcHeader& header) {
+  switch (records.layout) {
+    case ExtendedLayout::kNone:
+      return;
+    case ExtendedLayout::kSerialEm:
+      return read_serialem(extended, records, header);
+    case ExtendedLayout::kFei:
+      return read_fei(extended, header);
+    case ExtendedLayout::kFloats:
+      return read_floats(extended, records, header);
+  }
+}
+
+}  // namespace tomofield::io

@@ -1,0 +1,100 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "io/is_file.h"
+#include "io/tables/text_lines.h"
+#include "projects/formats.h"
+#include "tomofield/error.h"
+
+namespace tomofield::projects {
+
+namespace fs = std::filesystem;
+using io::is_file;
+namespace {
+
+using Entries = std::map<std::string, std::string, std::less<>>;
+
+// Reads the lines "Setup.DatasetName=TS_01"; comments begin with '#'.
+Entries read_entries(const fs::path& edf) {
+  Entries entries;
+  for (const io::TextLine& line : io::read_text_lines(edf)) {
+    const std::size_t equals = line.text.find('=');
+    if (line.text.starts_with('#') || equals == std::string::npos) continue;
+    const std::string_view text = line.text;
+    entries[std::string(io::trim(text.substr(0, equals)))] = io::trim(text.substr(equals + 1));
+  }
+  return entries;
+}
+
+std::string value_of(const Entries& entries, std::string_view name) {
+  const auto found = entries.find(name);
+  return found == entries.end() ? std::string() : found->second;
+}
+
+// Returns the first of the files NAME + ending that is there.
+template <std::size_t kCount>
+std::optional<fs::path> first_file(const fs::path& stem, std::array<const char*, kCount> endings) {
+  for (const char* ending : endings)
+    if (const fs::path file = stem.string() + ending; is_file(file)) return file;
+  return std::nullopt;
+}
+
+// Sets the files that eTomo names after a dataset, whose alignment may not be there yet.
+void set_dataset(Project& project, const fs::path& edf, const Entries& entries,
+                 const std::string& name) {
+  constexpr const char* kEntry = "Setup.DatasetName";
+  const fs::path stem = edf.parent_path() / name;
+  const auto stack = first_file(stem, std::array{".st", ".mrc", "_raw.mrc"});
+  if (!stack) {
+    throw Error(fmt::format(
+        "'{0}' names the dataset '{1}', and neither tilt.com nor '{1}.st' lies beside it: give a "
+        "stack itself with its options",
+        edf.string(), name));
+  }
+  project.set("stack", stack->string(), edf, kEntry);
+  if (const auto tlt = first_file(stem, std::array{".tlt", ".rawtlt"}))
+    project.set("--tlt", tlt->string(), edf, kEntry);
+  if (const fs::path xf = stem.string() + ".xf"; is_file(xf)) {
+    project.set("--xf", xf.string(), edf, kEntry);
+  } else {
+    for (const char* entry : {"Setup.ImageRotation", "Setup.AxisA.ImageRotation"}) {
+      const auto axis_deg = io::parse_number(value_of(entries, entry), base::kLargestAngle_deg / 2);
+      if (!axis_deg) continue;
+      project.set("--tilt-axis", fmt::format("{}", *axis_deg), edf, entry);
+      break;
+    }
+  }
+  if (const fs::path xtilt = stem.string() + ".xtilt"; is_file(xtilt))
+    project.set("--xtilt", xtilt.string(), edf, kEntry);
+}
+
+}  // namespace
+
+void read_edf_project(Project& project) {
+  const fs::path edf = project.request().path;
+  const fs::path tilt = edf.parent_path() / "tilt.com";
+  if (is_file(tilt)) {
+    project.add_file(tilt);
+    return read_imod_project(project, tilt);
+  }
+  const Entries entries = read_entries(edf);
+  const std::string name = value_of(entries, "Setup.DatasetName");
+  if (name.empty()) {
+    throw Error(fmt::format(
+        "'{}' names no dataset (Setup.DatasetName): give the folder's tilt.com, or a stack itself",
+        edf.string()));
+  }
+  if (value_of(entries, "Setup.AxisType").starts_with("Dual")) {
+    throw Error(fmt::format(
+        "'{}' is of two axes, which are reconstructed one by one: name tilta.com or tiltb.com, or "
+        "give a stack itself with its options",
+        edf.string()));
+  }
+  set_dataset(project, edf, entries, name);
+}
+
+}  // namespace tomofield::projects

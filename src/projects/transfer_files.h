@@ -1,0 +1,22 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "projects/project.h"
+
+namespace tomofield::projects {
+
+/// Sets --ctf to the contrast transfer that lies beside a series under its name, NAME.defocus
+/// (IMOD), NAME_CTF.txt (AreTomo) or NAME_ctf.star. With a contrast transfer, there or given by the
+/// user, sets --mtf to the only STAR file of the folder that has a detector's transfer function and
+/// "mtf" in its name. Returns true if a contrast transfer lies beside the series.
+bool set_transfer_files(Project& project, const std::filesystem::path& folder,
+                        const std::string& name);
+
+/// Sets --voltage, --cs and --amplitude-contrast from ctfplotter.com or ctfcorrection.com beside
+/// tilt.com (ctfplottera.com beside tilta.com). The last two describe a contrast transfer: they are
+/// set if there is one.
+void set_imod_optics(Project& project, const std::filesystem::path& tilt_com, bool has_transfer);
+
+}  // namespace tomofield::projects

@@ -1,0 +1,109 @@
+#include "tilt_series/contradictions.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/log.h"
+#include "base/statistics.h"
+#include "tilt_series/match_by_tilt.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+using Angles = std::vector<std::optional<double>>;  // [section]
+
+// An alignment that refines tilt angles changes them by less.
+constexpr double kLargestChange_deg = 3.0;
+constexpr double kLargestAxisChange_deg = 10.0;
+
+Angles values_of(const TiltAngles& angles) {
+  Angles values;
+  for (const auto& angle : angles.of_section)
+    values.push_back(angle ? std::optional(angle->value) : std::nullopt);
+  return values;
+}
+
+// Returns the offset that most of the differences share, or 0.
+double common_offset(const std::vector<double>& differences) {
+  const double median = base::median(differences);
+  const auto num_near = std::ranges::count_if(differences, [&](double difference) {
+    return std::fabs(difference - median) <= kLargestChange_deg;
+  });
+  return 2 * num_near > std::ssize(differences) ? median : 0.0;
+}
+
+void compare(const TiltAngles& used, const Angles& others, const std::string& other_source) {
+  const Angles angles = values_of(used);
+  std::vector<double> differences;
+  std::vector<std::size_t> sections;
+  for (std::size_t i = 0; i < angles.size(); ++i) {
+    if (!angles[i] || !others[i]) continue;
+    differences.push_back(*angles[i] - *others[i]);
+    sections.push_back(i);
+  }
+  if (differences.empty()) return;
+  const double offset = common_offset(differences);
+  std::size_t count = 0, first = 0;
+  for (std::size_t i = 0; i < differences.size(); ++i) {
+    if (std::fabs(differences[i] - offset) <= kLargestChange_deg) continue;
+    if (count++ == 0) first = sections[i];
+  }
+  if (count == 0) return;
+  base::log_warning(fmt::format(
+      "the tilt angles of '{}' differ from those of {} in {} of {} sections by more than a common "
+      "offset (section {}: {:g}° and {:g}°): are they in the order of the sections?",
+      used.source, other_source, count, differences.size(), first + 1, *angles[first],
+      *others[first]));
+}
+
+}  // namespace
+
+void warn_of_other_angles(const TiltAngles& used, const std::filesystem::path& path,
+                          const io::Mdoc& mdoc, const io::ImageStack& stack) {
+  if (used.source == path.string()) return;
+  Angles others;
+  for (const io::MdocSection& section : mdoc.sections) others.push_back(section.tilt_deg);
+  if (others.size() == used.of_section.size())
+    return compare(used, others, fmt::format("'{}'", path.string()));
+  if (match_by_tilt(values_of(used), others)) return;
+  base::log_warning(
+      fmt::format("'{}' has {} sections and '{}' {}, and their tilts do not say which belong "
+                  "together: are they "
+                  "of one series?",
+                  path.string(), mdoc.sections.size(), stack.name(), stack.header().nz));
+}
+
+void warn_of_other_angles(const TiltAngles& used, const io::ImageStack& stack) {
+  const auto& extended = stack.header().extended_tilt_deg;
+  const bool are_used = used.source == source_of_header(stack);
+  if (extended.size() != used.of_section.size() || are_used) return;
+  compare(used, Angles(extended.begin(), extended.end()),
+          fmt::format("the header of '{}'", stack.name()));
+}
+
+void warn_of_other_axis(const StatedAxis& stated, double aligned_axis_deg,
+                        const TiltSeriesOptions& options, const io::ImageStack& stack) {
+  const double difference_deg = angle_between_axes(stated.angle_deg, aligned_axis_deg);
+  if (stated.is_given || difference_deg <= kLargestAxisChange_deg) return;
+  const std::string alignment = options.xf    ? options.xf->string()
+                                : options.aln ? options.aln->string()
+                                              : stack.name();
+  base::log_warning(
+      fmt::format("'{}' turns the views by a tilt axis of {:.1f}°, and {} states {:.1f}°: are they "
+                  "of one series?",
+                  alignment, aligned_axis_deg, stated.source, stated.angle_deg));
+}
+
+void warn_of_unknown_axis(const io::ImageStack& stack) {
+  base::log_warning(fmt::format(
+      "no file states the tilt axis of '{}': it is looked for within some degrees of the "
+      "vertical; give its direction with --tilt-axis if it may be another one",
+      stack.name()));
+}
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+
+#include "io/images/image_stack.h"
+#include "io/tables/alignment_files.h"
+#include "tilt_series/tilt_angles.h"
+#include "tilt_series/tilt_axis.h"
+
+namespace tomofield::tilt_series {
+
+// Files of one series may state the same things. These warn where they contradict what is used, as
+// where a list is in another order than the sections of the stack.
+
+/// Warns if the angles that are used differ from those of the .mdoc by more than a common offset,
+/// or if the .mdoc has another number of sections and they do not match by tilt.
+void warn_of_other_angles(const TiltAngles& used, const std::filesystem::path& path,
+                          const io::Mdoc& mdoc, const io::ImageStack& stack);
+
+/// Does the same with the angles in the extended header of the stack.
+void warn_of_other_angles(const TiltAngles& used, const io::ImageStack& stack);
+
+/// Warns if an alignment turns the views by another axis than the one that a file states.
+void warn_of_other_axis(const StatedAxis& stated, double aligned_axis_deg,
+                        const TiltSeriesOptions& options, const io::ImageStack& stack);
+
+/// Warns that a raw stack is aligned whose tilt axis no file states.
+void warn_of_unknown_axis(const io::ImageStack& stack);
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,98 @@
+#include "tilt_series/tilt_axis.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <string_view>
+
+#include "io/tables/text_lines.h"
+#include "option_table/name_list.h"
+#include "tomofield/error.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+constexpr double kVertical_deg = 1.0;
+constexpr std::string_view kIgnoredEntry = "TiltAxisAngle";
+
+std::string lower_case(std::string text) {
+  std::ranges::transform(text, text.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+// Tells whether the labels say that a program has moved the pixels of the recorded images.
+bool is_transformed(const io::MrcHeader& header) {
+  constexpr std::array<std::string_view, 4> kPrograms{"transformed", "blendmont", "mrctaper",
+                                                      "tomofield"};
+  return std::ranges::any_of(header.labels, [&](const std::string& label) {
+    const std::string text = lower_case(label);
+    return std::ranges::any_of(
+        kPrograms, [&](std::string_view word) { return text.find(word) != std::string::npos; });
+  });
+}
+
+std::optional<double> axis_of_labels(const io::MrcHeader& header) {
+  for (const std::string& label : header.labels) {
+    const auto word = io::axis_of_title(label);
+    const auto axis_deg = word ? io::parse_number(*word, base::kLargestAngle_deg) : std::nullopt;
+    if (axis_deg) return axis_deg;
+  }
+  return std::nullopt;
+}
+
+std::optional<StatedAxis> axis_of_mdoc(const std::filesystem::path& path, const io::Mdoc& mdoc,
+                                       bool is_aligned) {
+  const auto line = [&](const io::AxisAngle& axis) {
+    return fmt::format("'{}', line {}", path.string(), axis.line);
+  };
+  if (mdoc.tilt_axis_deg) return StatedAxis{mdoc.tilt_axis_deg->value, line(*mdoc.tilt_axis_deg)};
+  if (!mdoc.unclear_axis_deg || is_aligned) return std::nullopt;
+  const double stated_deg = mdoc.unclear_axis_deg->value;
+  throw Error(fmt::format(
+      "{}: Tomography states TiltAxisAngle = {}°, which alone does not tell the tilt axis: it is "
+      "{:.4g}° in most files. Give it with --tilt-axis, or --ignore TiltAxisAngle if the views are "
+      "aligned already",
+      line(*mdoc.unclear_axis_deg), stated_deg, std::remainder(-stated_deg - 90.0, 360.0)));
+}
+
+}  // namespace
+
+double angle_between_axes(double a_deg, double b_deg) {
+  return std::fabs(std::remainder(a_deg - b_deg, 180.0));
+}
+
+std::optional<StatedAxis> find_stated_axis(const TiltSeriesOptions& options,
+                                           const io::ImageStack& stack,
+                                           const std::optional<io::Mdoc>& mdoc, bool is_aligned) {
+  if (options.tilt_axis_deg) return StatedAxis{*options.tilt_axis_deg, "--tilt-axis", true};
+  if (option_table::has_name(option_table::split_names(options.ignore), kIgnoredEntry))
+    return std::nullopt;
+  std::optional<StatedAxis> axis;
+  if (mdoc) axis = axis_of_mdoc(*options.mdoc, *mdoc, is_aligned);
+  const io::MrcHeader& header = stack.header();
+  if (!axis && !is_transformed(header)) {
+    const std::string source = fmt::format("the header of '{}'", stack.name());
+    if (const auto axis_deg = axis_of_labels(header))
+      axis = StatedAxis{*axis_deg, source};
+    else if (header.extended_axis_deg)
+      axis = StatedAxis{*header.extended_axis_deg, source};
+  }
+  if (axis) axis->angle_deg = std::remainder(axis->angle_deg, 360.0);
+  return axis;
+}
+
+void require_vertical(const StatedAxis& axis, const io::ImageStack& stack) {
+  if (angle_between_axes(axis.angle_deg, 0.0) <= kVertical_deg) return;
+  throw Error(fmt::format(
+      "{}: the tilt axis is turned by {:.6g}° from the vertical, so '{}' must be aligned: --align "
+      "full begins with this axis, --xf or --aln give an alignment, and --ignore TiltAxisAngle "
+      "says "
+      "that its views are aligned already",
+      axis.source, axis.angle_deg, stack.name()));
+}
+
+}  // namespace tomofield::tilt_series

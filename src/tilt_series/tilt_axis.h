@@ -1,0 +1,34 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "io/images/image_stack.h"
+#include "io/tables/alignment_files.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::tilt_series {
+
+/// The direction of the tilt axis in the images of a stack, and what states it.
+struct StatedAxis {
+  double angle_deg = 0.0;  ///< counter-clockwise from +Y, from −180 to 180
+  std::string source;      ///< for messages: "'TS_01.mdoc', line 9"
+  bool is_given = false;   ///< by the user with --tilt-axis
+};
+
+/// Returns the axis by the first of: --tilt-axis, the .mdoc, SerialEM's title among the labels of
+/// the stack, the stack's extended header. The labels of a stack that a program has transformed
+/// (newstack with an .xf file, blendmont) tell of the raw one, and so does its extended header:
+/// neither counts. Files do not count if --ignore names TiltAxisAngle. Throws Error for an .mdoc of
+/// Tomography from which the axis cannot be told, unless `is_aligned`: the axis is then not needed.
+std::optional<StatedAxis> find_stated_axis(const TiltSeriesOptions& options,
+                                           const io::ImageStack& stack,
+                                           const std::optional<io::Mdoc>& mdoc, bool is_aligned);
+
+/// Returns by how much two directions of an axis differ, in degrees from 0 to 90.
+double angle_between_axes(double a_deg, double b_deg);
+
+/// Throws Error for a stack that is taken for an aligned one although its axis is not vertical.
+void require_vertical(const StatedAxis& axis, const io::ImageStack& stack);
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,456 @@
+"""Tests that what a lab's own files state is read, and that what they do not say is asked for: the
+tilt axis, eTomo's defaults, the microscope, tables that have not one row a section, and names. The
+beads of these series lie at known places by the formulas of the other programs."""
+
+import os
+import re
+
+import numpy as np
+import pytest
+
+import harness
+from harness import fresh_directory
+
+TILTS = np.arange(-42, 43, 6.0)
+BEADS = [(12, 6, 5), (-14, 8, -6), (3, -15, 6), (-7, -10, -3)]  # from the centre: x, y, z
+PIXEL_A = 10.0
+
+
+def write(folder, name, text, encoding="utf-8"):
+    path = os.path.join(folder, name)
+    with open(path, "w", encoding=encoding, newline="") as file:
+        file.write(text)
+    return path
+
+
+def bead_views(axis, shape, tilts=TILTS, shift=(0.0, 0.0), beads=BEADS):
+    """Returns raw views [tilt, y, x] of beads: IMOD projects a bead to (X cos + Z sin, Y), and its
+    transforms turn that by the axis, counter-clockwise from +Y, about the middle of the view."""
+    height, width = shape
+    y, x = np.mgrid[:height, :width] + 0.5
+    cosine, sine = np.cos(np.radians(axis)), np.sin(np.radians(axis))
+    views = np.zeros((len(tilts), height, width), np.float32)
+    for view, tilt in zip(views, np.radians(tilts)):
+        for bead in beads:
+            u, v = bead[0] * np.cos(tilt) + bead[2] * np.sin(tilt), bead[1]
+            at_x = width / 2 + cosine * u - sine * v + shift[0]
+            at_y = height / 2 + sine * u + cosine * v + shift[1]
+            view += 100 * np.exp(-((x - at_x) ** 2 + (y - at_y) ** 2) / (2 * 1.5 ** 2))
+    return views + np.random.default_rng(1).normal(0, 1, views.shape).astype(np.float32)
+
+
+def write_series(name, axis=0.0, shape=(56, 72), tilts=TILTS, stack="TS_01.mrc", **keywords):
+    """Writes a raw stack and its angles, and returns its folder."""
+    folder = fresh_directory(name)
+    harness.write_stack(os.path.join(folder, stack), bead_views(axis, shape, tilts, **keywords),
+                        PIXEL_A)
+    np.savetxt(os.path.join(folder, "TS_01.rawtlt"), tilts, fmt="%.2f")
+    return folder
+
+
+def mdoc_text(tilts=TILTS, head="", entries=lambda i: ""):
+    text = head + "\n"
+    for i, tilt in enumerate(tilts):
+        text += f"\n[ZValue = {i}]\nTiltAngle = {tilt:.2f}\n{entries(i)}"
+    return text
+
+
+def transforms(axis, count=len(TILTS), shift=(0, 0)):
+    cosine, sine = np.cos(np.radians(axis)), np.sin(np.radians(axis))
+    return f"{cosine:.7f} {sine:.7f} {-sine:.7f} {cosine:.7f} {shift[0]} {shift[1]}\n" * count
+
+
+def dry(folder, *arguments, status=0):
+    result = harness.tomofield("reconstruct", *arguments, "--thickness", 24, "--contrast", "bright",
+                               "--dry-run", cwd=folder)
+    assert result.returncode == status, (arguments, result.stderr)
+    return result.stdout + result.stderr
+
+
+def expect(text, *parts):
+    for part in parts:
+        assert part in text, (part, text)
+
+
+def back_projection(folder, *arguments):
+    """Returns a back-projection of the series in a folder."""
+    output = os.path.join(folder, "wbp.mrc")
+    harness.succeed("baseline", "wbp", *arguments, "--contrast", "bright", "--bead-diameter", 0,
+                    "--overwrite", "-o", output, cwd=folder)
+    return harness.read_volume(output)
+
+
+def distances(volume):
+    return harness.distances_of_beads(volume, BEADS)
+
+
+# ------------------------------------------------------------------------------------ tilt axis
+
+AXES = {
+    "serialem.mdoc": ("[T =     Tilt axis angle = 85.3, binning = 1  spot = 8  camera = 2]", ""),
+    "tomography.mdoc": ("[T =   TiltAxisAngle = -175.30  Binning = 1  SpotSize = 6]",
+                        "RotationAngle = 85.30\n"),
+    "tomography_other.mdoc": ("[T =   TiltAxisAngle = 85.30  Binning = 1  SpotSize = 6]",
+                              "RotationAngle = 175.30\n"),
+    "entry.mdoc": ("TiltAxisAngle = 85.3", ""),
+    "windows.mdoc": ("\ufeffPixelSpacing = 10\r\n[T = Tilt axis angle = 85.3, binning = 1]\r", ""),
+}
+
+
+@pytest.mark.parametrize("name", AXES)
+def test_the_axis_of_an_mdoc_is_used(name):
+    folder = write_series("axis", 85.3)
+    title, entry = AXES[name]
+    write(folder, "TS_01.mdoc", mdoc_text(head=title, entries=lambda i: entry))
+    expect(dry(folder, "TS_01.mdoc", status=2), "85.3°", "TS_01.mrc", "--align full")
+    expect(dry(folder, "TS_01.mdoc", "--align", "full"), "tilt axis of the views: 85.3° from")
+    expect(dry(folder, "TS_01.mrc", "--mdoc", "TS_01.mdoc", status=2), "85.3°")
+    dry(folder, "TS_01.mdoc", "--ignore", "TiltAxisAngle")
+
+
+def write_titles(path, titles, extended=b"", shorts=(0, 0), kind=b"\0\0\0\0"):
+    """Replaces the titles of an MRC file, and gives it an extended header."""
+    content = bytearray(harness.read_bytes(path))
+    content[220:224] = len(titles).to_bytes(4, "little")
+    for i, title in enumerate(titles):
+        content[224 + 80 * i:304 + 80 * i] = title.encode().ljust(80)
+    content[92:96] = len(extended).to_bytes(4, "little")
+    content[104:108] = kind
+    content[128:132] = b"".join(n.to_bytes(2, "little", signed=True) for n in shorts)
+    with open(path, "wb") as file:
+        file.write(content[:1024] + extended + content[1024:])
+
+
+def float_records(axis):
+    """Returns records of Xplore3D: 32 floats, of which the first is the tilt, the 11th the axis and
+    the 12th the pixel size in metres."""
+    records = np.zeros((len(TILTS), 32), "<f4")
+    records[:, 0], records[:, 10], records[:, 11] = TILTS, axis, 1e-10 * PIXEL_A
+    return records.tobytes()
+
+
+@pytest.mark.parametrize("titles, extended", [
+    (["    Tilt axis angle = 85.3, binning = 1  spot = 8  camera = 2"], b""),
+    (["Fei Company (C) Copyright 2003"], float_records(-85.3)),
+    (["UCSF"], float_records(85.3))])
+def test_the_axis_of_a_header_is_used(titles, extended):
+    folder = write_series("header", 85.3)
+    stack = os.path.join(folder, "TS_01.mrc")
+    write_titles(stack, titles, extended, (0, 32) if extended else (0, 0))
+    words = ["TS_01.mrc"] if extended else ["TS_01.mrc", "--tlt", "TS_01.rawtlt"]
+    expect(dry(folder, *words, status=2), "the header of 'TS_01.mrc'", "85.3°")
+    expect(dry(folder, *words, "--align", "full"), "tilt axis of the views: 85.3° from")
+    # An aligned stack keeps the titles of the raw one.
+    write_titles(stack, titles + ["NEWSTACK: Images copied, transformed   27-Nov-26"])
+    dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt")
+
+
+def test_views_are_turned_by_the_axis():
+    folder = write_series("turned", 85.3)
+    words = ["TS_01.mrc", "--tlt", "TS_01.rawtlt", "--thickness", 24]
+    volume = back_projection(folder, *words, "--tilt-axis", 85.3)
+    assert volume.shape == (24, 72, 56)
+    assert distances(volume).max() < 0.5
+    assert distances(back_projection(folder, *words, "--tilt-axis", 75.3)).max() > 1
+    write(folder, "TS_01.xf", transforms(85.3))
+    expect(dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--xf", "TS_01.xf", "--tilt-axis", 85,
+               status=2), "--tilt-axis", "--xf")
+
+
+def test_an_alignment_begins_with_the_axis():
+    """Views that are shifted at random come back from one command."""
+    tilts = np.arange(-60, 61, 6.0)
+    folder = fresh_directory("raw")
+    random = np.random.default_rng(3)
+    beads = np.column_stack([random.uniform(-24, 24, 30), random.uniform(-24, 24, 30),
+                             random.uniform(-8, 8, 30)])
+    shifts = random.normal(0, 2, (len(tilts), 2))
+    views = [bead_views(85.3, (72, 72), [tilt], shift, beads)[0] for tilt, shift in zip(tilts, shifts)]
+    harness.write_stack(os.path.join(folder, "TS_01.mrc"), views, PIXEL_A)
+    write(folder, "TS_01.mdoc",
+          mdoc_text(tilts, "[T = Tilt axis angle = 85.3, binning = 1]"))
+    harness.succeed("align", "TS_01.mdoc", "--align", "full", "--thickness", 24, "--contrast", "bright",
+                    "--bead-diameter", 0, "-o", "a.mrc", cwd=folder)
+    rows = np.loadtxt(os.path.join(folder, "a_align.xf"))
+    axis = np.degrees(np.arctan2(rows[:, 1] - rows[:, 2], rows[:, 0] + rows[:, 3]))
+    assert np.abs(axis - 85.3).max() < 2
+    # The shift along the axis is what remains of -A shift; a common one is no error.
+    along = rows[:, 5] + rows[:, 2] * shifts[:, 0] + rows[:, 3] * shifts[:, 1]
+    assert np.std(along) < 0.5 < np.std(rows[:, 5])
+
+
+def test_what_the_axis_cannot_be_told_from_is_asked_for():
+    folder = write_series("unclear", 85.3)
+    write(folder, "TS_01.mdoc",
+          mdoc_text(head="[T =   TiltAxisAngle = -175.30  Binning = 1  SpotSize = 6]"))
+    for more in ([], ["--align", "full"]):
+        expect(dry(folder, "TS_01.mdoc", *more, status=2), "TiltAxisAngle = -175.3", "--tilt-axis", "85.3")
+    dry(folder, "TS_01.mdoc", "--align", "full", "--tilt-axis", 85.3)
+    os.remove(os.path.join(folder, "TS_01.mdoc"))
+    expect(dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--align", "full"),
+           "warning: no file states the tilt axis of 'TS_01.mrc'")
+
+
+def test_a_series_of_relion_that_is_not_aligned_yet():
+    folder = write_series("nominal", 85.3, stack="TS_01.mrcs")
+    rows = "".join(f"{i + 1:06}@TS_01.mrcs {tilt:.2f} 85.3\n" for i, tilt in enumerate(TILTS))
+    write(folder, "TS_01.star", "data_TS_01\n\nloop_\n_rlnMicrographName #1\n"
+          "_rlnTomoNominalStageTiltAngle #2\n_rlnTomoNominalTiltAxisAngle #3\n" + rows)
+    expect(dry(folder, "TS_01.star", status=2), "not aligned yet", "85.3°", "--align full")
+    expect(dry(folder, "TS_01.star", "--align", "full"), "tilt axis of the views: 85.3° from",
+           "tilts -42.0° to 42.0°")
+
+
+# ---------------------------------------------------------------------------------------- eTomo
+
+def write_etomo(name, axis=85.3, shape=(56, 72), newst="", tilt="", with_newst=True):
+    folder = write_series(name, axis, shape, stack="TS.st")
+    write(folder, "TS.xf", transforms(axis))
+    np.savetxt(os.path.join(folder, "TS.tlt"), TILTS, fmt="%.2f")
+    write(folder, "tilt.com", "$tilt -StandardInput\nInputProjections TS_ali.mrc\nOutputFile a.rec\n"
+          f"TILTFILE TS.tlt\nTHICKNESS 24\n{tilt}")
+    if with_newst:
+        write(folder, "newst.com", "$newstack -StandardInput\nInputFile\tTS.st\nOutputFile\tTS_ali.mrc\n"
+              f"TransformFile\tTS.xf\n{newst}")
+    return folder
+
+
+@pytest.mark.parametrize("newst", ["", "SizeToOutputInXandY\t,,\n", "SizeToOutputInXandY\t/\n",
+                                   "SizeToOutputInXandY\t72,/\n", "SizeToOutputInXandY ,56\n",
+                                   "SizeToOutputInXandY\t72,56\nOffsetsInXandY\t,\n"])
+def test_an_aligned_stack_without_a_size_has_that_of_the_raw_one(newst):
+    folder = write_etomo("sizes", newst=newst, tilt="FULLIMAGE 72 56\nSUBSETSTART 0 0\n")
+    assert "--center" not in harness.succeed("info", "tilt.com", cwd=folder).stdout
+    volume = back_projection(folder, "tilt.com")
+    assert volume.shape[1:] == (56, 56)  # what both the views and the aligned stack cover
+    assert distances(volume).max() < 0.5
+
+
+@pytest.mark.parametrize("tilt", ["FULLIMAGE 72 56\n", "FULLIMAGE 56 72\nSUBSETSTART 0 0\n", "FULLIMAGE\n",
+                                  "", "FULLIMAGE /\nSHIFT ,\nOFFSET /\n"])
+def test_tilt_com_alone_has_the_axis_in_the_middle(tilt):
+    folder = write_etomo("alone", with_newst=False, tilt=tilt)
+    assert distances(back_projection(folder, "tilt.com")).max() < 0.5
+
+
+def test_a_part_without_newst_com():
+    """SUBSETSTART counts from the whole aligned views, in which the aligned stack has 40 × 60 pixels
+    from (10, 4) on: its middle is 2 pixels right of the axis and 2 below the middle of the views."""
+    folder = write_etomo("part", with_newst=False, tilt="FULLIMAGE 56 72\nSUBSETSTART 10 4\n")
+    expect(dry(folder, "tilt.com", status=2), "SUBSETSTART", "newst.com")
+    harness.write_stack(os.path.join(folder, "TS_ali.mrc"), np.ones((len(TILTS), 60, 40), np.float32))
+    volume = back_projection(folder, "tilt.com")
+    assert volume.shape == (24, 60, 40)
+    beads = [(x - 2, y + 2, z) for x, y, z in BEADS]
+    assert harness.distances_of_beads(volume, beads).max() < 0.5
+
+
+def test_files_are_found_beside_a_folder_that_was_moved():
+    folder = write_etomo("moved", newst="")
+    np.savetxt(os.path.join(folder, "TS.xtilt"), np.zeros(len(TILTS)), fmt="%.2f")
+    for name in ("tilt.com", "newst.com"):
+        path = os.path.join(folder, name)
+        text = harness.read_bytes(path).decode().replace("TS.", "/old/cluster/TS.")
+        write(folder, name, text.replace("\n", "\r\n"))  # with the line ends of Windows
+    with open(os.path.join(folder, "tilt.com"), "a", encoding="utf-8") as file:
+        file.write("XTILTFILE C:\\old\\TS.xtilt\r\n")
+    printed = harness.succeed("info", "tilt.com", cwd=folder).stdout
+    expect(printed, "stack TS.st", "--xf TS.xf", "--tlt TS.tlt", "--xtilt TS.xtilt")
+
+
+def test_a_dataset_of_etomo():
+    folder = write_series("dataset", 85.3, stack="TS_01.st")
+    edf = write(folder, "TS_01.edf", "#Wed Jan 01\nSetup.DatasetName=TS_01\nSetup.AxisType=Single Axis\n"
+                "Setup.ImageRotation=85.3\n")
+    words = ["TS_01.edf", "--thickness", 24]
+    assert distances(back_projection(folder, *words)).max() < 0.5
+    expect(harness.succeed("info", ".", cwd=folder).stdout, "--tilt-axis 85.3 from", "TS_01.rawtlt")
+    write(folder, "TS_01.xf", transforms(85.3))
+    expect(harness.succeed("info", ".", cwd=folder).stdout, "--xf ./TS_01.xf")
+    write(folder, "TS_01.edf", "Setup.DatasetName=TS_01\nSetup.AxisType=Dual Axis\n")
+    expect(dry(folder, "TS_01.edf", status=2), "two axes", "tilta.com")
+    os.remove(os.path.join(folder, "TS_01.st"))
+    write(folder, "TS_01.edf", "Setup.DatasetName=TS_01\n")
+    expect(dry(folder, edf, status=2), "TS_01.st", "tilt.com")
+
+
+# ----------------------------------------------------------------------------------- microscope
+
+def ctf_text(defoci):
+    return "# Columns: #1 - micrograph number; #2 - defocus 1 [A]\n" + "".join(
+        f"{i + 1} {d} {d} 0 0 0.1 20\n" for i, d in enumerate(defoci))
+
+
+def test_the_voltage_of_an_mdoc_counts():
+    folder = write_series("voltage")
+    write(folder, "TS_01.mdoc", mdoc_text(head="Voltage = 120\nImageFile = TS_01.mrc"))
+    expect(dry(folder, "TS_01.mdoc", "--defocus", 3), "--voltage 120 from TS_01.mdoc: Voltage")
+    expect(dry(folder, "TS_01.mdoc", "--defocus", 3, "--voltage", 200), "not used: --voltage is given")
+    expect(dry(folder, "TS_01.mrc", "--mdoc", "TS_01.mdoc", "--defocus", 3),
+           "voltage: 120 kV from 'TS_01.mdoc'")
+    write(folder, "ctf.txt", "# acceleration voltage: 300.0 keV\n" + ctf_text([30000] * len(TILTS)))
+    expect(dry(folder, "TS_01.mdoc", "--ctf", "ctf.txt"), "warning: 'ctf.txt'", "300 kV", "120 kV")
+
+
+def test_the_pixel_size_of_a_binned_record():
+    folder = write_series("pixels")
+    harness.write_stack(os.path.join(folder, "TS_01.mrc"), bead_views(0, (56, 72)), 1.0)
+    write(folder, "TS_01.mdoc", mdoc_text(head="PixelSpacing = 5.4\nImageSize = 18 14"))
+    expect(dry(folder, "TS_01.mdoc"), "pixels of 1.35 Å")
+
+
+def test_the_contrast_transfer_beside_a_project_is_used():
+    folder = write_etomo("etomo_ctf", 0.0, newst="", tilt="FULLIMAGE 72 56\n")
+    defocus = "".join(f"{i + 1} {i + 1} {tilt:.2f} {tilt:.2f} 3000{' 2' if i == 0 else ''}\n"
+                      for i, tilt in enumerate(TILTS))
+    write(folder, "TS.defocus", defocus)
+    write(folder, "ctfcorrection.com", "$ctfphaseflip -StandardInput\nInputStack TS_ali.mrc\n"
+          "DefocusFile TS.defocus\nVoltage 200\nSphericalAberration 2.2\nAmplitudeContrast 0.1\n")
+    expect(dry(folder, "."), "--ctf ./TS.defocus from", "--voltage 200 from ./ctfcorrection.com: Voltage",
+           "--cs 2.2 from", "--amplitude-contrast 0.1 from", "the defocus of each view from")
+    for off in (["--ctf", "none"], ["--ignore", "CTF"], ["--engine", "ray"]):
+        assert "the defocus of each view from" not in dry(folder, ".", *off)
+    expect(dry(folder, ".", "--ignore", "CTF", "--defocus", 3), "--cs 2.2 from")
+    # An aligned stack whose phases IMOD flipped.
+    os.remove(os.path.join(folder, "TS.st"))
+    aligned = os.path.join(folder, "TS_ali.mrc")
+    harness.write_stack(aligned, bead_views(0, (56, 72)), PIXEL_A)
+    assert "--ctf-phase-flipped" not in dry(folder, ".")
+    write_titles(aligned, ["NEWSTACK: Images copied, transformed", "ctfPhaseFlip: CTF correction"])
+    expect(dry(folder, "."), "--ctf-phase-flipped true from ./TS_ali.mrc: ctfphaseflip")
+
+
+@pytest.mark.parametrize("ending", ["_CTF.txt", "_ctf.star"])
+def test_the_contrast_transfer_beside_an_alignment_is_used(ending):
+    folder = write_series("beside")
+    write(folder, "TS_01.aln", "# RawSize = 72 56 15\n" + "".join(
+        f"{i + 1} 0 1 0 0 1 1 1 0 {tilt}\n" for i, tilt in enumerate(TILTS)))
+    star = "data_\n\nloop_\n_rlnDefocusU #1\n_rlnDefocusV #2\n" + "30000 29000\n" * len(TILTS)
+    write(folder, "TS_01" + ending, ctf_text([30000] * len(TILTS)) if ending[-1] == "t" else star)
+    mtf = "data_\n\nloop_\n_rlnResolutionInversePixel #1\n_rlnMtfValue #2\n0 1\n0.5 0.4\n"
+    write(folder, "K3_mtf.star", mtf)
+    printed = dry(folder, "TS_01.aln")
+    expect(printed, f"--ctf TS_01{ending} from", "--mtf K3_mtf.star from", "what the detector passes")
+    write(folder, "other_mtf.star", mtf)
+    assert "--mtf" not in dry(folder, "TS_01.aln")  # nothing says which
+    write(folder, "TS_01.mrc.mdoc", mdoc_text())
+    expect(dry(folder, "TS_01.mrc.mdoc"), f"--ctf TS_01{ending} from")
+
+
+# --------------------------------------------------------------- tables and sections that differ
+
+def exposure_line(printed):
+    return [line for line in printed.splitlines() if line.startswith("dose:")]
+
+
+def test_the_mdoc_of_the_uncut_stack_is_matched_by_tilt():
+    all_tilts = np.arange(-60, 61, 6.0)
+    folder = write_series("uncut")
+    doses = "ExposureDose = 3\nDateTime = 12-Mar-21 10:{:02}:00\n"
+    write(folder, "all.mdoc", mdoc_text(all_tilts, "PixelSpacing = 10",
+                                        lambda i: doses.format(59 - i)))
+    words = ["TS_01.mrc", "--mdoc", "all.mdoc", "--defocus", 3]
+    printed = dry(folder, *words, "--tlt", "TS_01.rawtlt")
+    assert exposure_line(printed) == ["dose: from 'all.mdoc'"]
+    assert "warning" not in printed
+    expect(dry(folder, *words, status=2), "all.mdoc", "21 sections", "TS_01.mrc", "15 sections")
+    np.savetxt(os.path.join(folder, "odd.tlt"), TILTS + 3, fmt="%.2f")
+    expect(dry(folder, *words, "--tlt", "odd.tlt", status=2), "all.mdoc", "21", "15")
+
+
+def test_a_defocus_file_that_ends_early_goes_on():
+    folder = write_series("defocus")
+    words = ["TS_01.mrc", "--tlt", "TS_01.rawtlt", "--ctf", "TS.defocus"]
+    lines = [f"{i + 1} {i + 1} {tilt:.2f} {tilt:.2f} {3000 + 10 * i}" for i, tilt in enumerate(TILTS)]
+    write(folder, "TS.defocus", "\n".join([lines[0] + " 2"] + lines[1:10]) + "\n")
+    expect(dry(folder, *words), "the defocus of each view from 'TS.defocus'")
+    more = [f"{i + 16} {i + 16} {tilt:.2f} {tilt:.2f} 4000" for i, tilt in enumerate([48, 54])]
+    write(folder, "TS.defocus", "\n".join([lines[0] + " 2"] + lines[1:] + more) + "\n")
+    expect(dry(folder, *words), "the defocus of each view from 'TS.defocus'")  # matched by tilt
+
+
+def test_the_table_of_aretomo_3_has_no_dark_frames():
+    folder = write_series("dark", tilts=TILTS)
+    kept = [i for i in range(len(TILTS)) if i not in (2, 9)]
+    head = "# RawSize = 72 56 15\n# DarkFrame = 2 0 -30\n# DarkFrame = 9 0 12\n# AlphaOffset = 6\n"
+    write(folder, "TS_01.aln", head + "".join(
+        f"{i + 1} 0 1 0 0 1 1 1 0 {TILTS[i] + 6}\n" for i in kept))
+    write(folder, "TS_01_CTF.txt", ctf_text([30000 + 100 * i for i in kept]))
+    words = ["TS_01.aln", "--epochs", 1, "--coarse-epochs", 2, "--contrast", "bright", "--thickness", 24,
+             "--bead-diameter", 0]
+    volumes = []
+    write(folder, "full.txt", ctf_text([30000 + 100 * i for i in range(len(TILTS))]))
+    for table in ("TS_01_CTF.txt", "full.txt"):
+        output = os.path.join(folder, table + ".mrc")
+        harness.succeed("reconstruct", *words, "--ctf", table, "-o", output, cwd=folder)
+        volumes.append(harness.read_volume(output))
+    assert np.array_equal(*volumes)
+    write(folder, "short.txt", ctf_text([30000] * 4))
+    expect(dry(folder, "TS_01.aln", "--ctf", "short.txt", status=2), "short.txt", "4 sections", "15")
+
+
+def test_the_angles_of_aretomo_3_have_three_columns():
+    folder = write_series("columns")
+    order = np.argsort(np.argsort(np.abs(TILTS), kind="stable"), kind="stable") + 1
+    write(folder, "TS_01_TLT.txt", "".join(f"{t:8.2f} {n:4d} {3:8.2f}\n" for t, n in zip(TILTS, order)))
+    printed = dry(folder, "TS_01.mrc", "--tlt", "TS_01_TLT.txt", "--defocus", 3)
+    expect(printed, "tilts -42.0° to 42.0° from TS_01_TLT.txt", "dose: from 'TS_01_TLT.txt'")
+
+
+# --------------------------------------------------------------------------- late and contradictory
+
+def test_a_black_half_is_refused():
+    folder = write_series("halves")
+    views = bead_views(0, (56, 72))
+    harness.write_stack(os.path.join(folder, "even.mrc"), views)
+    odd = views.copy()
+    odd[3:5] = 7
+    harness.write_stack(os.path.join(folder, "odd.mrc"), odd)
+    result = harness.tomofield("reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--even", "even.mrc",
+                               "--odd", "odd.mrc", "--thickness", 24, "--contrast", "bright", "-o",
+                               "o.mrc", cwd=folder)
+    assert result.returncode == 2 and not os.path.exists(os.path.join(folder, "o.mrc"))
+    expect(result.stderr, "sections 4,5 of 'odd.mrc' are constant")
+
+
+def test_a_tomogram_is_no_stack():
+    folder = write_series("own", stack="TS_01.st")
+    write(folder, "TS_01.aln", "# RawSize = 72 56 15\n" + "".join(
+        f"{i + 1} 0 1 0 0 1 1 1 0 {tilt}\n" for i, tilt in enumerate(TILTS)))
+    words = ["reconstruct", "TS_01.aln", "--thickness", 24, "--contrast", "bright", "--epochs", 1,
+             "--coarse-epochs", 2, "--tv", 5, "-o", "TS_01.mrc"]
+    harness.succeed(*words, cwd=folder)
+    harness.succeed(*words, "--overwrite", cwd=folder)
+    expect(dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt", status=2), "'TS_01.mrc'", "tomofield wrote")
+
+
+def test_a_batch_takes_a_stack_once():
+    folder = write_series("batch")
+    write(folder, "TS_01.mrc.mdoc", mdoc_text())
+    words = ["batch", "TS_01.mr*", "--tlt", "TS_01.rawtlt", "--thickness", 24, "--contrast", "bright",
+             "-o", "res"]
+    result = harness.tomofield(*words, "--dry-run", cwd=folder)
+    assert result.returncode == 2
+    expect(result.stderr, "'TS_01.mrc' and 'TS_01.mrc.mdoc'", "the same stack", "leave one of them out")
+    # Rows of a table may try several settings on one stack.
+    write(folder, "two.csv", "stack,bin,name\nTS_01.mrc,1,a\nTS_01.mrc,2,b\n")
+    words[1] = "two.csv"
+    harness.succeed(*words, "--dry-run", cwd=folder)
+
+
+# ------------------------------------------------------------------------------------ the program
+
+def test_the_program_alone_shows_its_help():
+    result = harness.succeed()
+    expect(result.stdout, "Usage: tomofield", "reconstruct")
+
+
+def test_a_dry_run_needs_no_output():
+    folder = write_series("dry")
+    before = sorted(os.listdir(folder))
+    expect(dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt"), "tomogram 72 × 56 × 24 voxels")
+    assert sorted(os.listdir(folder)) == before
+    result = harness.tomofield("reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--thickness", 24,
+                               cwd=folder)
+    assert result.returncode == 2
+    assert re.search("--output is required", result.stderr)
