@@ -182,8 +182,8 @@ def test_damaged_and_foreign_models_are_refused():
     expect_refusal(["zeroed.h5", "checksum"], "zeroed.h5", "-o", "new.mrc")
     with h5py.File("foreign.h5", "w") as foreign:
         foreign["voltage"] = 300.0
-    expect_refusal(["foreign.h5", "not written by tomofield"], "foreign.h5", "-o", "new.mrc")
-    expect_refusal(["foreign.h5", "not written by tomofield"], "foreign.h5", command="info")
+    expect_refusal(["foreign.h5", "no model of tomofield"], "foreign.h5", "-o", "new.mrc")
+    expect_refusal(["foreign.h5", "no model of tomofield"], "foreign.h5", command="info")
 
     # HDF5 itself must stay silent about damaged metadata, too.
     damaged = bytearray(whole_model)

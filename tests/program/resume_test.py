@@ -211,7 +211,7 @@ def test_foreign_checkpoints_are_refused(command, refuse, series, stopped_run, u
 
     with h5py.File(results.model_path, "w") as file:
         file["density"] = np.arange(10.0)
-    refuse(results, ["not written by tomofield"])
+    refuse(results, ["no model of tomofield"])
     with open(results.model_path, "w") as file:
         file.write("a list of things to do\n" * 100)
     refuse(results, ["HDF5"])
