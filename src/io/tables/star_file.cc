@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <stdexcept>
 #include <utility>
@@ -20,13 +21,14 @@ bool stands_for_nothing(const std::string& value) {
 }
 
 // Words that begin a part of a STAR file, in any case (Hall, J. Chem. Inf. Comput. Sci. 31, 326,
-// 1991).
+// 1991), and those that stand for no value.
 bool is_reserved(std::string_view value) {
+  if (value == "?" || value == ".") return true;
   std::string word(value);
   std::ranges::transform(word, word.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return word.starts_with("data_") || word.starts_with("save_") || word == "loop_" ||
-         word == "stop_" || word == "global_";
+  return std::ranges::any_of(std::array{"data_", "save_", "loop_", "stop_", "global_"},
+                             [&](std::string_view reserved) { return word.starts_with(reserved); });
 }
 
 std::string quoted_where_needed(const std::string& value) {

@@ -84,7 +84,8 @@ TEST(StarFile, ReadsTheTextsThatItWrites) {
   const ScratchDirectory scratch;
   const std::vector<std::string> texts{
       "data_x", "Data_",       "loop_",        "stop_", "save_1", "global_", "[x]", "two\nlines",
-      "$a",     "it's \"so\"", "a\n\"b\" 'c'", "_x",    "#1",     ";",       "ä",   "tab\tbed"};
+      "$a",     "it's \"so\"", "a\n\"b\" 'c'", "_x",    "#1",     ";",       "ä",   "tab\tbed",
+      "?",      ".",           "loop_es"};
   StarTable table("global", {"rlnTomoName", "rlnTomoHand"});
   for (const std::string& text : texts) table.add_row({text, text});
   const auto tables = read_star_file(scratch.write("a.star", star_file_text(table)));
