@@ -37,6 +37,10 @@ template <typename T>
 struct InPython {
   using type = decltype(to_python(std::declval<T>()));
 };
+template <>
+struct InPython<bool> {
+  using type = py::bool_;  // None is no False
+};
 
 template <typename T>
 T from_python(const Row& row, const typename InPython<T>::type& value) {

@@ -19,6 +19,7 @@ enum class Origin {
 /// somebody chooses its value. An open one may have a usual value, from which trials start.
 ///
 /// It reads and is assigned like a plain value: `options.fit.epochs = 30` is a value that is given.
+/// `options.fit.epochs = tomofield::FitOptions().epochs` opens it again.
 template <typename T>
 class Choice {
  public:
@@ -53,6 +54,7 @@ class Choice {
     if (is_open()) *this = {std::move(value), Origin::kDerived};
   }
 
+  /// Compares the values alone; two choices are equal if their origins are, too.
   template <typename U>
   friend constexpr bool operator==(const Choice& a, const U& b) {
     return a.value_.has_value() && *a.value_ == b;

@@ -85,8 +85,8 @@ bool align(const TiltSeries& series, const Options& options, const ProgressCallb
 /// or else the processors that this process may use. Results have the same bits for any number.
 void set_thread_count(int count);
 
-/// Fills in the options that follow from other options, as reconstruct() does. The penalty and its
-/// weight stay empty if neither is given, since trials on the data choose them. `files` are those
+/// Fills in the options that follow from other options, as reconstruct() does. Those that trials on
+/// the data choose stay open (Choice::is_open()). `files` are those
 /// of the series: with a contrast transfer, plain vertices take more epochs.
 Options resolve_options(const Options& options, const SeriesFiles& files = {});
 

@@ -114,7 +114,11 @@ class Project:
     """A tilt series as eTomo, AreTomo, RELION 5, Warp or SerialEM describe it, from open_project()."""
 
     def __init__(self, core: Any) -> None:
-        self._core = core
+        object.__setattr__(self, "_core", core)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set an option, which goes over what the files say."""
+        _chosen(self._core, {name: value})
 
     @property
     def settings(self) -> List[Setting]:
@@ -124,7 +128,7 @@ class Project:
     def __getattr__(self, name: str) -> Any:
         """Return the value of an option (tomofield.Options), or None if nobody chose it."""
         if name.startswith("_") or name not in {"stack", *Options.__annotations__}:
-            raise AttributeError(name)
+            raise AttributeError(f"there is no option '{name}'")
         return getattr(self._core, name)
 
 
@@ -198,7 +202,7 @@ def _inputs(series: Any, tilt_deg: Optional[Sequence[float]],
 def _chosen(choices: Any, given: Dict[str, Any]) -> Any:
     for name, value in given.items():
         if name not in Options.__annotations__:
-            raise TypeError(f"reconstruct() has no option '{name}'")
+            raise TypeError(f"there is no option '{name}'")
         try:
             setattr(choices, name, value)
         except TypeError:

@@ -146,6 +146,8 @@ std::vector<std::string> ReconstructOptions::faults() const {
   refuse_if(fit.tune && is_ray, "--tune predicts aligned views: it needs --engine slab");
   refuse_if(fit.tune && fit.patience > 0,
             "--tune chooses the number of epochs: leave --early-stop out");
+  refuse_if(run.resume && run.overwrite,
+            "--resume continues a run and --overwrite starts it over: give one of them");
   refuse_if(run.resume && run.output.empty(),
             "--resume continues from the files of an interrupted run: give their output");
   refuse_if(run.align != Alignment::kOff && is_ray,

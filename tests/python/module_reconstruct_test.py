@@ -168,6 +168,10 @@ def test_bad_input_is_refused_in_a_sentence(series, quick):
         tomofield.reconstruct(views, tilts, **{**quick, "contrast": "grey"})
     with pytest.raises(TypeError, match="rank cannot be 'many'"):
         tomofield.reconstruct(views, tilts, **{**quick, "rank": "many"})
+    with pytest.raises(TypeError, match="with_margin cannot be None"):
+        tomofield.reconstruct(views, tilts, **{**quick, "with_margin": None})
+    with pytest.raises(tomofield.Error, match="--resume .* --overwrite"):
+        tomofield.reconstruct(views, tilts, **quick, resume=True, overwrite=True, output="x.mrc")
     with pytest.raises(TypeError, match="no option 'ranks'"):
         tomofield.reconstruct(views, tilts, **quick, ranks=3)
     with pytest.raises(tomofield.Error, match="cannot read 'absent.json'"):
