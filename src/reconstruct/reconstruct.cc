@@ -169,6 +169,17 @@ bool align_views(options::ReconstructOptions& options, const Observer& observer,
       processes);
 }
 
+// Notes the tilt axis by which views are turned because a file states it.
+void note_axis(const tilt_series::TiltSeries& series, options::ReconstructOptions& options) {
+  const auto& axis = series.axis_of_file();
+  if (!axis) return;
+  options.views.tilt_axis_deg = axis->angle_deg;
+  options.settings.push_back({.option = "--tilt-axis",
+                              .value = fmt::format("{:.6g}", axis->angle_deg),
+                              .file = axis->source,
+                              .entry = ""});
+}
+
 // Plans the run, and tells the observer.
 plan::RunPlan make_plan(const tilt_series::TiltSeries& series,
                         const options::ReconstructOptions& options, const Observer& observer,
@@ -228,6 +239,7 @@ RunResult run(options::ReconstructOptions options, const Observer& observer,
   if (!align_views(options, observer, processes)) return {.outcome = Outcome::kStoppedAligning};
   const tilt_series::TiltSeries series(options.input(), processes);
   const plan::RunPlan plan = make_plan(series, options, observer, processes);
+  note_axis(series, options);
   Run run = begin_run(series, std::move(options), observer, processes);
   std::optional<tune::TunedFit> tuned;
   if (!choose_settings(run, tuned)) return {.outcome = Outcome::kStoppedTuning};

@@ -28,8 +28,9 @@ struct SeriesPlan {
   std::int64_t aligned_height = 0;
   double pixel_size_A = 1.0;  ///< of an unbinned pixel
   double bin_factor = 1.0;
-  std::string angle_source;  ///< for messages: a file name, or the stack's header
-  std::string axis;  ///< for messages: the axis by which views are turned, and what states it
+  std::string angle_source;        ///< for messages: a file name, or the stack's header
+  std::optional<AxisOfFile> axis;  ///< by which views are turned, if no alignment is given
+  bool axis_is_given = false;      ///< by the user, not by a file
 };
 
 /// Returns the width and the height that IMOD's transforms give the aligned views, in unbinned

@@ -201,7 +201,9 @@ struct TiltSeries::Impl {
                     std::min_element(views.begin(), views.end(), has_lower_tilt)->tilt_deg,
                     std::max_element(views.begin(), views.end(), has_lower_tilt)->tilt_deg,
                     plan.angle_source, width, height, plan.pixel_size_A * plan.bin_factor));
-    if (!plan.axis.empty()) base::log_info(fmt::format("tilt axis of the views: {}", plan.axis));
+    if (plan.axis)
+      base::log_info(fmt::format("tilt axis of the views: {:.6g}° from {}", plan.axis->angle_deg,
+                                 plan.axis->source));
     if (fixed_pattern.is_any())
       base::log_info("fixed pattern removed: " + describe_pattern(fixed_pattern));
   }
@@ -391,6 +393,11 @@ const std::vector<double>& TiltSeries::noise_sigma() const { return impl_->noise
 double TiltSeries::empty_beam() const { return impl_->intensity.empty_beam; }
 
 double TiltSeries::background() const { return impl_->background; }
+const std::optional<AxisOfFile>& TiltSeries::axis_of_file() const {
+  static const std::optional<AxisOfFile> kNone;
+  return impl_->plan.axis_is_given ? kNone : impl_->plan.axis;
+}
+
 const MaskMetrics& TiltSeries::mask_metrics() const { return impl_->beads.metrics; }
 const std::vector<std::vector<MaskDisc>>& TiltSeries::undecided_beads() const {
   return impl_->beads.undecided;

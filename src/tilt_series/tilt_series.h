@@ -65,6 +65,12 @@ struct MaskMetrics {
   FixedPatternMetrics fixed_pattern;  ///< what was removed from all views
 };
 
+/// A direction of the tilt axis in the stack's images, and what states it.
+struct AxisOfFile {
+  double angle_deg = 0.0;  ///< counter-clockwise from +Y
+  std::string source;      ///< for messages: "'TS_01.mdoc', line 9"
+};
+
 /// Describes the beads in a few words: "12 beads of 10 nm", or "no beads".
 std::string describe_beads(const MaskMetrics& masks);
 
@@ -138,6 +144,9 @@ class TiltSeries {
   /// Returns the intensity of the emptiest places of a bright series (intensity.h), in the units of
   /// read_view; 0 for kDark.
   double background() const;
+
+  /// Returns the axis by which the views are turned, if a file states it and none aligns them.
+  const std::optional<AxisOfFile>& axis_of_file() const;
 
   const MaskMetrics& mask_metrics() const;
 

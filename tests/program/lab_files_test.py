@@ -2,6 +2,7 @@
 tilt axis, eTomo's defaults, the microscope, tables that have not one row a section, and names. The
 beads of these series lie at known places by the formulas of the other programs."""
 
+import json
 import os
 import re
 
@@ -177,6 +178,14 @@ def test_an_alignment_begins_with_the_axis():
     # The shift along the axis is what remains of -A shift; a common one is no error.
     along = rows[:, 5] + rows[:, 2] * shifts[:, 0] + rows[:, 3] * shifts[:, 1]
     assert np.std(along) < 0.5 < np.std(rows[:, 5])
+    harness.succeed("reconstruct", "TS_01.mdoc", "--align", "full", "--thickness", 24, "--contrast",
+                    "bright", "--bead-diameter", 0, "--epochs", 1, "--coarse-epochs", 2, "-o", "r.mrc",
+                    cwd=folder)
+    with open(os.path.join(folder, "r.json"), encoding="utf-8") as file:
+        record = json.load(file)
+    assert record["options"]["input"]["tilt_axis_deg"] == 85.3
+    axis_of_file = [o for o in record["origins"] if o["option"] == "--tilt-axis"]
+    assert len(axis_of_file) == 1 and "TS_01.mdoc" in axis_of_file[0]["file"]
 
 
 def test_what_the_axis_cannot_be_told_from_is_asked_for():
