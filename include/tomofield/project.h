@@ -17,7 +17,7 @@ struct Project {
   std::vector<std::string> warnings;  ///< of what the result does not show by itself
 };
 
-/// What a user may say about a project.
+/// A project to be read, and the wishes of the user for reading it.
 struct ProjectRequest {
   std::filesystem::path path;  ///< of its main file or its folder, or of a stack alone
   std::string series = {};     ///< the name of one series of a project that has several

@@ -47,7 +47,7 @@ struct JobList {
   bool overwrites = false;  ///< replace what other runs have left
 };
 
-/// What a job needs and which files it has.
+/// The needs and the files of a job.
 struct JobPlan {
   Needs needs;
   JobFiles files;

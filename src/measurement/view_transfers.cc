@@ -38,7 +38,7 @@ void require_pixel_size(const tilt_series::TiltSeriesOptions& input,
                   stack));
 }
 
-// What is known of the sections of a stack when a table is matched to them.
+// Describes the sections of a stack to which a table is matched.
 struct Sections {
   const tilt_series::TiltSeriesOptions& input;
   std::string stack;

@@ -211,8 +211,10 @@ std::string set_from_text(const Row& row, std::string_view text, Choices& choice
       if (wanted.empty()) value = {std::move(found), origin};
       return wanted;
     } else {
-      if (text == kAutomatic) value.reset();
-      if (text == kAutomatic) return {};
+      if (text == kAutomatic) {
+        value.reset();
+        return {};
+      }
       Value found{};
       std::string wanted = read_chosen(text, found);
       if (wanted.empty()) value = std::move(found);

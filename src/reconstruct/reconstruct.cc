@@ -171,8 +171,8 @@ bool align_views(options::ReconstructOptions& options, const Observer& observer,
 
 // Notes the tilt axis by which views are turned because a file states it.
 void note_axis(const tilt_series::TiltSeries& series, options::ReconstructOptions& options) {
-  const auto& axis = series.axis_of_file();
-  if (!axis) return;
+  const auto& axis = series.stated_axis();
+  if (!axis || axis->is_given) return;
   options.views.tilt_axis_deg = axis->angle_deg;
   options.settings.push_back({.option = "--tilt-axis",
                               .value = fmt::format("{:.6g}", axis->angle_deg),

@@ -24,7 +24,7 @@ namespace tomofield::reconstruction {
 RunResult run(options::ReconstructOptions options, const Observer& observer,
               const distributed::Communicator& processes = distributed::Communicator::alone());
 
-/// What a run would do and need.
+/// The plan of a run, and the time and the disk that it needs.
 struct Preview {
   plan::RunPlan plan;
   plan::RunEstimate estimate;

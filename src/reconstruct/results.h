@@ -25,7 +25,7 @@ enum class Outcome {
   kStoppedAligning,  ///< during the alignment, of which nothing is kept
 };
 
-/// What a run comes to. Only a finished one has more than its outcome.
+/// The result of a run. Only a finished run has more than its outcome.
 struct RunResult {
   Outcome outcome = Outcome::kFinished;
   /// The model; each process has the parameters of its own leaves. A run with halves has none: its
@@ -38,7 +38,7 @@ struct RunResult {
   std::filesystem::path checkpoint = {};             ///< of a run that was stopped during the fit
 };
 
-/// What an examination of a finished fit finds.
+/// The findings of an examination of a finished fit.
 struct Examination {
   nlohmann::json metrics;
   verdict::Verdict verdict;

@@ -288,8 +288,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
 
   plan.angle_source = angles.source;
   plan.is_raw = alignment.has_value();
-  if (axis && alignment && !has_alignment) plan.axis = AxisOfFile{axis->angle_deg, axis->source};
-  plan.axis_is_given = options.tilt_axis_deg.has_value();
+  if (alignment && !has_alignment) plan.axis = axis;
   const auto size = aligned_size(alignment.value_or(InPlaneAlignment{}), header);
   plan.aligned_width = size[0];
   plan.aligned_height = size[1];

@@ -29,8 +29,7 @@ struct SeriesPlan {
   double pixel_size_A = 1.0;  ///< of an unbinned pixel
   double bin_factor = 1.0;
   std::string angle_source;        ///< for messages: a file name, or the stack's header
-  std::optional<AxisOfFile> axis;  ///< by which views are turned, if no alignment is given
-  bool axis_is_given = false;      ///< by the user, not by a file
+  std::optional<StatedAxis> axis;  ///< by which views are turned, if no alignment is given
 };
 
 /// Returns the width and the height that IMOD's transforms give the aligned views, in unbinned

@@ -9,13 +9,6 @@
 
 namespace tomofield::tilt_series {
 
-/// The direction of the tilt axis in the images of a stack, and what states it.
-struct StatedAxis {
-  double angle_deg = 0.0;  ///< counter-clockwise from +Y, from −180 to 180
-  std::string source;      ///< for messages: "'TS_01.mdoc', line 9"
-  bool is_given = false;   ///< by the user with --tilt-axis
-};
-
 /// Returns the axis by the first of: --tilt-axis, the .mdoc, SerialEM's title among the labels of
 /// the stack, the stack's extended header. The labels of a stack that a program has transformed
 /// (newstack with an .xf file, blendmont) tell of the raw one, and so does its extended header:

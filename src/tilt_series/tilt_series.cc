@@ -393,10 +393,7 @@ const std::vector<double>& TiltSeries::noise_sigma() const { return impl_->noise
 double TiltSeries::empty_beam() const { return impl_->intensity.empty_beam; }
 
 double TiltSeries::background() const { return impl_->background; }
-const std::optional<AxisOfFile>& TiltSeries::axis_of_file() const {
-  static const std::optional<AxisOfFile> kNone;
-  return impl_->plan.axis_is_given ? kNone : impl_->plan.axis;
-}
+const std::optional<StatedAxis>& TiltSeries::stated_axis() const { return impl_->plan.axis; }
 
 const MaskMetrics& TiltSeries::mask_metrics() const { return impl_->beads.metrics; }
 const std::vector<std::vector<MaskDisc>>& TiltSeries::undecided_beads() const {

@@ -65,10 +65,11 @@ struct MaskMetrics {
   FixedPatternMetrics fixed_pattern;  ///< what was removed from all views
 };
 
-/// A direction of the tilt axis in the stack's images, and what states it.
-struct AxisOfFile {
-  double angle_deg = 0.0;  ///< counter-clockwise from +Y
+/// The direction of the tilt axis in the images of a stack, and what states it.
+struct StatedAxis {
+  double angle_deg = 0.0;  ///< counter-clockwise from +Y, from −180 to 180
   std::string source;      ///< for messages: "'TS_01.mdoc', line 9"
+  bool is_given = false;   ///< by the user with --tilt-axis
 };
 
 /// Describes the beads in a few words: "12 beads of 10 nm", or "no beads".
@@ -145,8 +146,8 @@ class TiltSeries {
   /// read_view; 0 for kDark.
   double background() const;
 
-  /// Returns the axis by which the views are turned, if a file states it and none aligns them.
-  const std::optional<AxisOfFile>& axis_of_file() const;
+  /// Returns the axis by which the views are turned, if no alignment of a file turns them.
+  const std::optional<StatedAxis>& stated_axis() const;
 
   const MaskMetrics& mask_metrics() const;
 

@@ -17,7 +17,7 @@ enum class ExtendedLayout {
   kFloats,    ///< UCSF's, and those of Xplore3D: integers and floats; float 0 is the tilt
 };
 
-/// What the fixed header says of the extended one.
+/// The description of an extended header in the fixed one.
 struct ExtendedRecords {
   ExtendedLayout layout = ExtendedLayout::kNone;
   std::int64_t bytes_per_section = 0;

@@ -10,8 +10,8 @@ namespace tomofield::io {
 /// yet; the folders before it may be links. A circle of links is returned as it is.
 std::filesystem::path end_of_links(const std::filesystem::path& path);
 
-/// What two paths have in common if they are the same file, however they are spelled and whichever
-/// links lead there.
+/// Two paths have the same identity if they are the same file, however they are spelled and
+/// whichever links lead there.
 struct FileIdentity {
   std::uint64_t device = 0, inode = 0;  ///< of the file, or else of its folder
   std::filesystem::path name;           ///< in its folder, of a file that does not exist
