@@ -6,7 +6,7 @@
 #include "output/alignment_files.h"
 #include "output/output_paths.h"
 #include "report/alignment_plot.h"
-#include "tilt_series/open_views.h"
+#include "tilt_series/planned_series.h"
 #include "tomofield/error.h"
 
 namespace tomofield::exchange {
@@ -33,7 +33,7 @@ std::vector<io::OutputLock> claim_alignment(const options::ReconstructOptions& o
   });
 }
 
-void write_alignment_results(const tilt_series::TiltSeries& series,
+void write_alignment_results(const tilt_series::PlannedSeries& series,
                              const options::ReconstructOptions& options) {
   if (options.run.align == Alignment::kOff) return;
   const auto stack = tilt_series::open_views(options.input());

@@ -35,7 +35,7 @@ class Plan : public ::testing::Test {
     options_.fit.subsets = 4;
   }
 
-  RunPlan plan() const { return plan_run(tilt_series::TiltSeries(options_.input()), options_); }
+  RunPlan plan() const { return plan_run(tilt_series::PlannedSeries(options_.input()), options_); }
 
   testing::ScratchDirectory scratch_;
   options::ReconstructOptions options_;

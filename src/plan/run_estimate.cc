@@ -168,15 +168,13 @@ struct ViewTimes {
 };
 
 // Measures them on a view in the middle of the series.
-ViewTimes measure_view(const tilt_series::TiltSeries& series, bool aligns) {
-  const auto pixels = static_cast<std::size_t>(series.width() * series.height());
-  std::vector<float> image(pixels);
-  std::vector<std::uint8_t> valid(pixels);
+ViewTimes measure_view(const tilt_series::PlannedSeries& series, bool aligns) {
   ViewTimes times;
   const base::ProcessorStopwatch decoding;
-  series.read_view(series.views().size() / 2, image, valid);
+  const tilt_series::MaskedImage image =
+      tilt_series::decode_view(series, series.views().size() / 2);
   times.decoding = decoding.seconds();
-  if (aligns) times.update = align::seconds_of_update(image, series.width());
+  if (aligns) times.update = align::seconds_of_update(image.values, series.width());
   return times;
 }
 
@@ -186,7 +184,7 @@ double num_voxels(const RunPlan& run) {
 }
 
 // Returns the bytes of the scratch files of the decoded views and of the rays.
-std::size_t scratch_bytes(const tilt_series::TiltSeries& series,
+std::size_t scratch_bytes(const tilt_series::PlannedSeries& series,
                           const measurement::Measurement& plan) {
   const std::size_t views = static_cast<std::size_t>(series.width() * series.height()) *
                             series.views().size() * sizeof(float);
@@ -196,7 +194,7 @@ std::size_t scratch_bytes(const tilt_series::TiltSeries& series,
 
 }  // namespace
 
-RunEstimate estimate_run(const tilt_series::TiltSeries& series,
+RunEstimate estimate_run(const tilt_series::PlannedSeries& series,
                          const options::ReconstructOptions& given, const RunPlan& run) {
   const options::ReconstructOptions options = given.with_open_prior();
   measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);

@@ -25,7 +25,7 @@
 #include "io/tables/text_lines.h"
 #include "io/tables/view_table.h"
 #include "measurement/view_transfers.h"
-#include "tilt_series/open_views.h"
+#include "tilt_series/planned_series.h"
 #include "tomofield/error.h"
 
 namespace tomofield::realign {
@@ -302,7 +302,7 @@ json alignment_origin(const options::ReconstructOptions& options) {
   return {{"made_with", relevant_options(options)}, {"series", series_json(options)}};
 }
 
-json alignment_record(const tilt_series::TiltSeries& series, const align::Alignment& found,
+json alignment_record(const tilt_series::PlannedSeries& series, const align::Alignment& found,
                       double seconds) {
   json views = json::array();
   for (std::size_t v = 0; v < series.views().size(); ++v) {
@@ -326,7 +326,7 @@ json alignment_record(const tilt_series::TiltSeries& series, const align::Alignm
   return record;
 }
 
-void add_left_out(const tilt_series::TiltSeries& series, const align::Alignment& first,
+void add_left_out(const tilt_series::PlannedSeries& series, const align::Alignment& first,
                   json& record) {
   for (const int view : first.unaligned) {
     const auto at = static_cast<std::size_t>(view);

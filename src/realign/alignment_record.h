@@ -5,7 +5,7 @@
 
 #include "align/alignment.h"
 #include "options/run_options.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/planned_series.h"
 
 namespace tomofield::realign {
 
@@ -17,12 +17,12 @@ namespace tomofield::realign {
 nlohmann::json alignment_origin(const options::ReconstructOptions& options);
 
 /// Returns the record of an alignment, without its origin.
-nlohmann::json alignment_record(const tilt_series::TiltSeries& series,
+nlohmann::json alignment_record(const tilt_series::PlannedSeries& series,
                                 const align::Alignment& found, double seconds);
 
 /// Adds the views that were left out before `found` was made to the record of the others, with how
 /// they agreed in `first`, the alignment of all views of `series`.
-void add_left_out(const tilt_series::TiltSeries& series, const align::Alignment& first,
+void add_left_out(const tilt_series::PlannedSeries& series, const align::Alignment& first,
                   nlohmann::json& record);
 
 /// Reads the record that a run resumes from. Throws Error if it is damaged, or made from something

@@ -26,9 +26,7 @@ class AlignmentRecord : public ::testing::Test {
  protected:
   AlignmentRecord() {
     write_series(scratch_.path(), 0);
-    tilt_series::TiltSeriesOptions input = run().input();
-    input.look_at_views = false;
-    record_ = alignment_record(tilt_series::TiltSeries(input), found(), 1.5);
+    record_ = alignment_record(tilt_series::PlannedSeries(run().input()), found(), 1.5);
     record_.update(alignment_origin(run()));
     io::write_json(file_, record_);
   }
