@@ -34,12 +34,12 @@ std::size_t memory_of_alignment(const tilt_series::PlannedSeries& series,
                                 options::ReconstructOptions options,
                                 const distributed::Communicator& processes) {
   const bool from_raw = options.run.align == Alignment::kFull;
-  options.field = align::planned_field(options.field);
-  options.fit = align::planned_fits(plan, from_raw, options.fit.seed).front().options;
+  options.field = alignment::planned_field(options.field);
+  options.fit = alignment::planned_fits(plan, from_raw, options.fit.seed).front().options;
   const fit::Domain domain = fit::make_domain(plan.geometry, plan.roi, options.field);
   return estimate_memory({series, plan, domain, options, processes},
                          fit::make_stages(options.field, options.fit)) +
-         series.stored_memory(processes) + align::memory_beside_fit(plan);
+         series.stored_memory(processes) + alignment::memory_beside_fit(plan);
 }
 
 // Returns the bytes that writing the results of halves takes: the rays, and a model that is
@@ -138,8 +138,8 @@ RunPlan plan_run(const tilt_series::PlannedSeries& series, const options::Recons
   run.num_steps = (last.first_epoch + last.epochs) * run.steps_an_epoch;
   run.tiles = plan_tiles({series, plan, domain, options, processes});
   const bool aligns = options.run.align != Alignment::kOff;
-  if (aligns && options.alignment.is_null())
-    align::require_views(static_cast<std::size_t>(run.num_views));
+  if (aligns && !options.alignment)
+    alignment::require_views(static_cast<std::size_t>(run.num_views));
   run.memory_bytes = run.tiles.is_used()
                          ? run.tiles.memory_bytes
                          : estimate_memory({series, plan, domain, options, processes}, run.stages);
@@ -184,7 +184,7 @@ void check_alignment_alone(const options::ReconstructOptions& options) {
   const distributed::Communicator& alone = distributed::Communicator::alone();
   const tilt_series::PlannedSeries series(options.input());
   const measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
-  align::require_views(series.views().size());
+  alignment::require_views(series.views().size());
   base::require_memory(memory_of_alignment(series, plan, options, alone), "this alignment",
                        "use a larger --bin, a smaller --roi or --thickness, or fewer --threads");
 }
