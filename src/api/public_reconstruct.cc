@@ -9,6 +9,7 @@
 #include "options/run_options.h"
 #include "output/public_model.h"
 #include "reconstruct/reconstruct.h"
+#include "record/run_record.h"
 #include "tomofield/error.h"
 #include "tomofield/messages.h"
 #include "tomofield/reconstruct.h"
@@ -107,8 +108,10 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
   reconstruction::RunResult run =
       reconstruction::run(internal_options(series, options), listener.observer());
   if (run.outcome != reconstruction::Outcome::kFinished) return {};
-  Reconstruction made{
-      .is_finished = true, .tomogram = {}, .model = {}, .metrics = io::json_text(run.metrics)};
+  Reconstruction made{.is_finished = true,
+                      .tomogram = {},
+                      .model = {},
+                      .metrics = io::json_text(record::to_json(run.record))};
   if (options.run.output.empty())
     made.tomogram = output::sample_tomogram(*run.model, options.volume.invert);
   if (run.model) made.model = ModelAccess::make(std::move(*run.model));

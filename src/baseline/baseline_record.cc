@@ -88,10 +88,10 @@ json metrics_json(const BaselineRecord& record) {
           {"seconds", seconds},
           {"threads", base::thread_count()},
           {"threads_why", base::describe_threads()},
-          {"mask", output::mask_json(series)},
+          {"mask", output::mask_json(output::masked_views(series))},
           {"views", views},
           {"held_out",
-           held_out ? output::report_held_out(*held_out, series.geometry.tilt_deg) : json(nullptr)},
+           held_out ? output::held_out_json(*held_out, series.geometry.tilt_deg) : json(nullptr)},
           {"tuning", tuned ? tune::tuned_json(*tuned, json_of) : json(nullptr)}};
 }
 

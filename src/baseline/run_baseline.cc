@@ -24,6 +24,7 @@
 #include "measurement/undecided_beads.h"
 #include "measurement/view_transfers.h"
 #include "option_table/values.h"
+#include "output/metrics_record.h"
 #include "output/model_file.h"
 #include "output/output_paths.h"
 #include "output/volume.h"
@@ -232,6 +233,7 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   std::optional<measurement::ViewErrors> errors;
   if (!held_out.empty())
     errors = held_out_errors(problem, held_out, fit_view_scale, solution.densities);
+  if (errors) output::log_held_out(*errors);
   write_volume(solution, series, options, paths.volume);
   write_record(paths.json, {options, series, problem, solution, size.num_parameters, fit_seconds,
                             tuned, errors});

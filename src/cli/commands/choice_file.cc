@@ -3,7 +3,6 @@
 #include "cli/commands/run_reconstruction.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
-#include "io/json.h"
 #include "reconstruct/reconstruct.h"
 
 namespace tomofield::cli {
@@ -20,11 +19,8 @@ void add_choice_option(CLI::App& command, std::optional<std::filesystem::path>& 
 void write_choice(const std::filesystem::path& file, const options::ReconstructOptions& options,
                   const distributed::Communicator& processes) {
   stop_on_signals(processes.size() > 1);
-  const auto choice = reconstruction::choose(options, terminal_observer(processes), processes);
-  if (!choice) throw ExitStatus{stop_status(), "stopped during the trials"};
-  processes.run_collectively([&] {
-    if (processes.is_root()) io::write_json(file, *choice);
-  });
+  if (!reconstruction::choose(file, options, terminal_observer(processes), processes))
+    throw ExitStatus{stop_status(), "stopped during the trials"};
   if (processes.is_root()) print("choice    {}\n", file.string());
 }
 
