@@ -27,6 +27,7 @@
 #include "option_table/setting.h"
 #include "option_table/values.h"
 #include "output/metrics.h"
+#include "output/public_model.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
 #include "projection/sample_grid.h"
@@ -165,6 +166,18 @@ AfterIteration report_to(const base::ProgressSink& progress, const MethodFacts& 
   };
 }
 
+// Returns the volume in the input's units and contrast.
+Tomogram tomogram_of(const Solution& solution, const measurement::Measurement& series,
+                     const BaselineOptions& options) {
+  const output::ModelInfo info = output::model_info(series, options.shared.views.contrast);
+  const field::OrientedBox box = output::region_box(info, 1.0);
+  Tomogram tomogram{.size = box.size,
+                    .voxel_size_A = info.pixel_size_A,
+                    .values = field::gather_box(box, voxels_of(solution.densities))};
+  output::to_output(info, tomogram.values, options.shared.volume.invert);
+  return tomogram;
+}
+
 void write_volume(const Solution& solution, const measurement::Measurement& series,
                   const BaselineOptions& options, const std::filesystem::path& path) {
   output::ModelInfo info = output::model_info(series, options.shared.views.contrast);
@@ -174,20 +187,11 @@ void write_volume(const Solution& solution, const measurement::Measurement& seri
                path);
 }
 
-void write_results(const Solution& solution, const measurement::Measurement& series,
-                   const BaselineOptions& options, const nlohmann::json& metrics,
-                   const BaselinePaths& paths) {
-  write_volume(solution, series, options, paths.volume);
-  io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
-                              {"options", options_json(options)},
-                              {"origins", option_table::settings_json(options.shared.settings)},
-                              {"metrics", metrics}});
-}
-
-BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays,
-                           const measurement::Measurement& series) {
-  return {2 * solution.data_loss.back() / static_cast<double>(num_rays), last_decrease(solution),
-          series.masks.bead_masking};
+nlohmann::json record_of(const BaselineOptions& options, nlohmann::json metrics) {
+  return {{"tomofield", TOMOFIELD_VERSION},
+          {"options", options_json(options)},
+          {"origins", option_table::settings_json(options.shared.settings)},
+          {"metrics", std::move(metrics)}};
 }
 
 // Prepares the views, and corrects their contrast transfer if the options have one.
@@ -196,8 +200,7 @@ measurement::Measurement prepare(const tilt_series::TiltSeries& tilt_series,
                                  const std::filesystem::path& scratch_dir) {
   measurement::Measurement series = measurement::prepare_measurement(
       tilt_series, options.shared.specimen, scratch_dir,
-      measurement::view_transfers(output::series_options(options.files, options.shared),
-                                  options.shared.specimen.hand, tilt_series));
+      measurement::view_transfers(options.input(), options.shared.specimen.hand, tilt_series));
   if (series.transfers.empty()) return series;
   const base::TraceSpan span("correct contrast transfer");
   measurement::correct_ctf(options.ctf_correction, series);
@@ -207,6 +210,12 @@ measurement::Measurement prepare(const tilt_series::TiltSeries& tilt_series,
 }
 
 }  // namespace
+
+tilt_series::TiltSeriesOptions BaselineOptions::input() const {
+  tilt_series::TiltSeriesOptions input = output::series_options(files, shared);
+  input.images = images;
+  return input;
+}
 
 BaselinePaths baseline_paths(const std::filesystem::path& volume) {
   std::filesystem::path stem = volume;
@@ -219,6 +228,7 @@ void check_options(const BaselineOptions& options) {
   base::require_no_faults(option_table::range_faults(options.shared));
   const auto faults = measurement::faults_of_transfer(options.files, options.shared.views);
   base::require_no_faults({faults.begin(), faults.end()});
+  if (options.shared.run.output.empty()) return;
   io::require_volume_name(options.shared.run.output);
   const BaselinePaths paths = baseline_paths(options.shared.run.output);
   io::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
@@ -300,8 +310,19 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
       metrics_json(solution, problem, series, size.num_parameters, fit_seconds);
   metrics["held_out"] = held_out_json(problem, held_out, fit_view_scale, solution.densities);
   metrics["tuning"] = tuning;
-  write_results(solution, series, options, metrics, paths);
-  return summary_of(solution, problem.num_rays(), series);
+  BaselineSummary summary{
+      .mean_squared_residual =
+          2 * solution.data_loss.back() / static_cast<double>(problem.num_rays()),
+      .last_decrease = last_decrease(solution),
+      .bead_masking = series.masks.bead_masking,
+      .record = record_of(options, std::move(metrics))};
+  if (options.shared.run.output.empty()) {
+    summary.tomogram = tomogram_of(solution, series, options);
+  } else {
+    write_volume(solution, series, options, paths.volume);
+    io::write_json(paths.json, summary.record);
+  }
+  return summary;
 }
 
 void write_linear_volume(const measurement::Measurement& series, const Options& shared,

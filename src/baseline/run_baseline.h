@@ -1,16 +1,20 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
 #include "base/progress.h"
 #include "baseline/method.h"
+#include "io/images/image_stack.h"
 #include "io/saving/output_lock.h"
 #include "measurement/prepare.h"
 #include "microscope/view_filter.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
+#include "tomofield/tomogram.h"
 
 namespace tomofield::baseline {
 
@@ -24,6 +28,10 @@ struct BaselineOptions {
   Method method;
   /// Corrects the views before, if there is a contrast transfer.
   microscope::CtfCorrection ctf_correction = microscope::CtfCorrection::kFlip;
+  std::shared_ptr<const io::ImageStack> images = {};  ///< views in memory, in place of files.stack
+
+  /// Returns how the tilt series is read.
+  tilt_series::TiltSeriesOptions input() const;
 };
 
 /// The files of a run, named after its volume.
@@ -33,7 +41,8 @@ struct BaselinePaths {
 BaselinePaths baseline_paths(const std::filesystem::path& volume);
 
 /// Checks the options and the output files. Throws Error for options out of range, and if results
-/// would replace existing ones without `overwrite` or cannot be written.
+/// would replace existing ones without `overwrite` or cannot be written. Without an output there are
+/// no files.
 void check_options(const BaselineOptions& options);
 
 /// Checks the options and locks the files of a run against other runs. The run holds the locks to
@@ -55,11 +64,13 @@ struct BaselinePlan {
 /// memory than the run needs.
 BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options);
 
-/// The results of a run that the program prints.
+/// The results of a run that the program prints, or that stay in memory.
 struct BaselineSummary {
   double mean_squared_residual = 0;     ///< in units of the noise's variance
   std::optional<double> last_decrease;  ///< last_decrease(), for iterative methods
   tilt_series::BeadMasking bead_masking = tilt_series::BeadMasking::kNone;
+  nlohmann::json record = {};                ///< metrics and options: what the JSON file has
+  std::optional<Tomogram> tomogram = {};     ///< of a run without an output
 };
 
 /// The receivers of the progress of a run.
@@ -68,8 +79,9 @@ struct BaselineProgress {
 };
 
 /// Reads the series, tunes if the options ask for it, reconstructs, and writes the volume (MRC, in
-/// the input's units and contrast) and the metrics and resolved options (JSON). Starts at once:
-/// call check_options() and plan_baseline() first.
+/// the input's units and contrast) and the metrics and resolved options (JSON). Without an output it
+/// returns the volume and writes nothing. Starts at once: call check_options() and plan_baseline()
+/// first. An exception of `progress` ends it.
 BaselineSummary run_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options,
                              const BaselineProgress& progress);
 

@@ -36,6 +36,7 @@ struct RunResult {
   tilt_series::BeadMasking bead_masking = tilt_series::BeadMasking::kNone;
   std::vector<std::filesystem::path> pictures = {};  ///< that were drawn
   std::filesystem::path checkpoint = {};             ///< of a run that was stopped during the fit
+  Options options = {};  ///< as they were used, with what trials have chosen
 };
 
 /// The findings of an examination of a finished fit.

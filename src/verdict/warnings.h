@@ -16,6 +16,7 @@ struct GivenInput {
   std::vector<double> tilt_deg = {};  ///< of each view
   double thickness = 0.0;             ///< in pixels of the fit
   double bin_factor = 1.0;            ///< of these pixels to the stack's
+  Alignment aligned_before = Alignment::kOff;  ///< RunOptions::align
 };
 
 /// Returns what is off in a run, the most serious first. Faults of the series as a whole (views

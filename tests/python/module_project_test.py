@@ -73,10 +73,14 @@ def test_a_project_says_what_its_files_set(folder):
 
 def test_options_go_over_a_project(folder, tmp_path):
     tomofield.reconstruct(folder, output=tmp_path / "o.mrc", tilt_offset_deg=0.25, **QUICK)
-    record = tomofield.read_metrics(tmp_path / "o.mrc")
-    assert record["options"]["input"]["tilt_offset_deg"] == 0.25
-    used = {origin["option"] for origin in record["origins"]}
-    assert "--tilt-offset" not in used and "--thickness" in used
+    record = tomofield.read_record(tmp_path / "o.mrc")
+    assert record.options["input"]["tilt_offset_deg"] == 0.25
+    settings = {setting.option: setting for setting in record.settings}
+    assert settings["--tilt-offset"].value == "0.5"
+    assert settings["--tilt-offset"].instead == "--tilt-offset 0.25"
+    assert settings["--thickness"].instead == ""
+    report = (tmp_path / "o_report.html").read_text()
+    assert f"given, in place of 0.5 ({folder / 'tilt.com'}: OFFSET)" in report
 
 
 def test_a_stack_is_a_project_of_itself(series):

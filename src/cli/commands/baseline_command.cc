@@ -15,6 +15,7 @@
 #include "cli/options/common_options.h"
 #include "cli/options/enum_option.h"
 #include "cli/options/fit_options.h"
+#include "cli/options/given_options.h"
 #include "cli/options/help_formatter.h"
 #include "cli/options/number_checks.h"
 #include "cli/options/table_options.h"
@@ -72,7 +73,7 @@ void print_summary(const baseline::BaselineSummary& summary) {
 void run_method(const baseline::BaselineOptions& options, const baseline::MethodFacts& method,
                 const baseline::BaselinePaths& paths, const DryRun& dry_run) {
   const Options& shared = options.shared;
-  tilt_series::TiltSeriesOptions input = output::series_options(options.files, shared);
+  tilt_series::TiltSeriesOptions input = options.input();
   input.keep_views = !dry_run.is_wanted;
   const tilt_series::TiltSeries series(input);
   const baseline::BaselinePlan plan = baseline::plan_baseline(series, options);
@@ -95,14 +96,15 @@ void run_method(const baseline::BaselineOptions& options, const baseline::Method
 }
 
 template <typename Method>
-void run(BaselineArguments<Method>& arguments, const Origins& origins) {
-  option_table::note_settings(origins, arguments.choices);
+void run(const CLI::App& command, BaselineArguments<Method>& arguments, const Origins& origins) {
+  note_origins(command, origins, arguments.choices);
   const Options& shared = arguments.choices.options;
+  if (shared.run.output.empty()) throw Error("-o '' names no file: name the tomogram");
   Method& method = arguments.method;
   if constexpr (requires { method.non_negative; })
     method.non_negative = arguments.non_negative.value_or(shared.views.contrast != Contrast::kDark);
   const baseline::BaselineOptions options{arguments.choices.files, shared, method,
-                                          arguments.ctf_correction};
+                                          arguments.ctf_correction, {}};
   std::vector<io::OutputLock> locks;
   if (arguments.dry_run.is_wanted)
     baseline::check_options(options);
@@ -169,7 +171,7 @@ std::shared_ptr<BaselineArguments<Method>> add_method(CLI::App& command, const O
   add_common_options(command);
   add_trace_option(command, arguments->trace);
   add_help_all(command);
-  command.callback([arguments, &origins] { run(*arguments, origins); });
+  command.callback([&command, arguments, &origins] { run(command, *arguments, origins); });
   return arguments;
 }
 

@@ -5,6 +5,9 @@
 
 #include <algorithm>
 
+#include "cli/options/table_options.h"
+#include "option_table/setting.h"
+
 namespace tomofield::cli {
 
 std::vector<option_table::GivenOption> given_options(const CLI::App& command,
@@ -18,6 +21,19 @@ std::vector<option_table::GivenOption> given_options(const CLI::App& command,
       added.value = fmt::format("{}", fmt::join(option->results(), ","));
   }
   return given;
+}
+
+void note_origins(const CLI::App& command, const std::vector<Setting>& settings,
+                  option_table::Choices& choices) {
+  option_table::note_settings(settings, choices);
+  for (const CLI::Option* option : command.get_options()) {
+    const option_table::Row* row = option->count() == 0 ? nullptr : row_of_option(*option);
+    if (row == nullptr) continue;
+    const bool is_of_file = std::ranges::any_of(settings, [&](const Setting& setting) {
+      return setting.instead.empty() && option->check_name(setting.option);
+    });
+    if (!is_of_file) choices.options.given.emplace_back(row->flag);
+  }
 }
 
 }  // namespace tomofield::cli
