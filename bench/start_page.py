@@ -11,7 +11,7 @@ import readme_page
 import start_folders
 
 PAGE = os.path.join(readme_page.PROJECT, "docs", "start.md")
-SIZE = 192  # pixels of a view, for the pictures
+SIZE = 128  # pixels of a view, for the pictures
 
 
 def commands(text=None):

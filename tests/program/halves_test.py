@@ -314,7 +314,7 @@ def test_the_log_says_what_the_halves_are_not_for(series):
 
 def test_the_log_says_that_halves_have_no_prior():
     series = harness.Series("prior")
-    output = os.path.join(fresh_directory("prior_log"), "out.mrc")
+    output = os.path.join(harness.fresh_directory("prior_log"), "out.mrc")
     said = harness.succeed("reconstruct", *series.input, "--thickness", harness.THICKNESS, "--contrast",
                            "bright", "--no-margin", "--epochs", 1, "--coarse-epochs", 0, "--prior",
                            "learned", "--tv-penalty", "smooth", "--split-tilts", "-o", output).stderr
