@@ -27,6 +27,7 @@
 #include "option_table/setting.h"
 #include "option_table/values.h"
 #include "output/metrics.h"
+#include "output/output_paths.h"
 #include "output/public_model.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
@@ -217,12 +218,6 @@ tilt_series::TiltSeriesOptions BaselineOptions::input() const {
   return input;
 }
 
-BaselinePaths baseline_paths(const std::filesystem::path& volume) {
-  std::filesystem::path stem = volume;
-  stem.replace_extension();
-  return {volume, stem.string() + ".json", stem};
-}
-
 void check_options(const BaselineOptions& options) {
   constexpr const char* kAdvice = "give --overwrite to replace it, or another name with -o";
   base::require_no_faults(option_table::range_faults(options.shared));
@@ -230,19 +225,22 @@ void check_options(const BaselineOptions& options) {
   base::require_no_faults({faults.begin(), faults.end()});
   if (options.shared.run.output.empty()) return;
   io::require_volume_name(options.shared.run.output);
-  const BaselinePaths paths = baseline_paths(options.shared.run.output);
-  io::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
-                         options.shared.run.overwrite, kAdvice);
+  const output::OutputPaths paths = output::output_paths(options.shared.run.output);
+  std::vector<std::filesystem::path> results = paths.pictures();
+  results.insert(results.end(), {paths.volume, paths.json});
+  io::check_output_files(results, io::input_files(options.files), options.shared.run.overwrite,
+                         kAdvice);
   if (options.shared.volume.zarr)
     output::check_zarr(paths.volume, options.shared.run.overwrite, kAdvice);
 }
 
 std::vector<io::OutputLock> claim_outputs(const BaselineOptions& options) {
-  const BaselinePaths paths = baseline_paths(options.shared.run.output);
+  const output::OutputPaths paths = output::output_paths(options.shared.run.output);
   return io::claim_outputs({paths.volume, paths.json}, [&] { check_options(options); });
 }
 
-BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {
+BaselinePlan plan_baseline(const tilt_series::PlannedSeries& series,
+                           const BaselineOptions& options) {
   const measurement::Measurement planned =
       measurement::plan_measurement(series, options.shared.specimen);
   measurement::require_pixels(planned.geometry.width, planned.geometry.height);
@@ -280,7 +278,7 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
                              const BaselineOptions& requested, const BaselineProgress& progress) {
   base::log_info(base::describe_threads());
   BaselineOptions options = requested;
-  const BaselinePaths paths = baseline_paths(options.shared.run.output);
+  const output::OutputPaths paths = output::output_paths(options.shared.run.output);
   const bool fit_view_scale = fits_view_scale(options);
   measurement::Measurement series =
       prepare(tilt_series, options, io::scratch_directory(paths.volume));

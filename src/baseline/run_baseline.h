@@ -34,12 +34,6 @@ struct BaselineOptions {
   tilt_series::TiltSeriesOptions input() const;
 };
 
-/// The files of a run, named after its volume.
-struct BaselinePaths {
-  std::filesystem::path volume, json, picture_prefix;
-};
-BaselinePaths baseline_paths(const std::filesystem::path& volume);
-
 /// Checks the options and the output files. Throws Error for options out of range, and if results
 /// would replace existing ones without `overwrite` or cannot be written. Without an output there are
 /// no files.
@@ -62,7 +56,8 @@ struct BaselinePlan {
 
 /// Plans a run. Throws Error for options that do not fit the series, and if the machine has less
 /// memory than the run needs.
-BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options);
+BaselinePlan plan_baseline(const tilt_series::PlannedSeries& series,
+                           const BaselineOptions& options);
 
 /// The results of a run that the program prints, or that stay in memory.
 struct BaselineSummary {

@@ -34,6 +34,7 @@
 #include "report/choice_plot.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
+#include "tune/trial_record.h"
 #include "verdict/judge.h"
 
 namespace tomofield::reconstruction {
@@ -184,7 +185,7 @@ void make_compact(const compact::Budget& budget, RunResult& results) {
       [&](const compact::CodedField& coded) { return output::coded_file_size(coded, model); });
   results.model->field = std::move(made.field);
   results.model->coded = std::move(made.coded);
-  results.metrics["metrics"]["compact"] = compact::report_json(made.report, running.seconds());
+  results.metrics["metrics"]["compact"] = output::compact_json(made.report, running.seconds());
 }
 
 // Does the same. If that fails, keeps the finished fit.
@@ -219,7 +220,8 @@ Examination examine(const fit::Fit& fit, const measurement::Measurement& measure
   found.metrics.update(
       evaluate::artefacts_json(found.verdict.artefacts.speckle, found.verdict.artefacts.faces));
   found.metrics["verdict"] = verdict::verdict_json(found.verdict);
-  found.metrics["alignment"] = run.options.alignment;
+  found.metrics["alignment"] =
+      run.options.alignment ? alignment::to_json(*run.options.alignment) : nlohmann::json(nullptr);
   found.metrics["tuning"] = tuned ? tune::tuning_json(*tuned) : nlohmann::json(nullptr);
   return found;
 }
