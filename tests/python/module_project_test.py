@@ -108,16 +108,21 @@ def tomograms(series, tmp_path_factory):
              [[f"{i + 1:06d}@s.mrcs", 0, tilt, 0, 0, shift_A]
               for i, tilt in enumerate(series.tilt_deg)])
     star(path / "tomograms.star", "global",
-         ["rlnTomoName", "rlnTomoTiltSeriesStarFile", "rlnTomoTiltSeriesPixelSize", "rlnTomoSizeZ"],
-         [[name, f"{name}.star", 10.0, 16] for name in ("TS_01", "TS_02")])
+         ["rlnTomoName", "rlnTomoTiltSeriesStarFile", "rlnTomoTiltSeriesPixelSize", "rlnTomoSizeX",
+          "rlnTomoSizeY", "rlnTomoSizeZ"],
+         [[name, f"{name}.star", 10.0, 32, 32, 16] for name in ("TS_01", "TS_02")])
     return path / "tomograms.star"
+
+
+def likeness(one, other):
+    return np.corrcoef(one.ravel(), other.ravel())[0, 1]
 
 
 def test_one_of_several_series_is_named_in_every_function(tomograms, tmp_path):
     with pytest.raises(tomofield.Error, match="TS_01.*TS_02|--series"):
         tomofield.reconstruct(tomograms, **QUICK)
     project = tomofield.open_project(tomograms, series="TS_02")
-    assert {s.row for s in project.settings if s.option == "--thickness"} == {"TS_02"}
+    assert {s.row for s in project.settings if s.option == "stack"} == {"TS_02"}
     by_project = tomofield.reconstruct(project, **QUICK).tomogram
     by_name = tomofield.reconstruct(tomograms, series="TS_02", **QUICK).tomogram
     other = tomofield.reconstruct(tomograms, series="TS_01", **QUICK).tomogram
@@ -125,7 +130,7 @@ def test_one_of_several_series_is_named_in_every_function(tomograms, tmp_path):
     back = tomofield.baseline(tomograms, series="TS_02", contrast="bright", with_margin=False)
     first = tomofield.baseline(tomograms, series="TS_01", contrast="bright", with_margin=False)
     for moved, still in ((by_name, other), (back.tomogram, first.tomogram)):
-        np.testing.assert_allclose(moved[:, 4:24], still[:, 8:28], atol=0.35 * np.std(still))
+        assert likeness(moved[:, 4:24], still[:, 8:28]) > 0.97 > likeness(moved[:], still[:])
     assert tomofield.align(tomograms, series="TS_01", output=tmp_path / "a.mrc", contrast="bright",
                            with_margin=False)
     assert (tmp_path / "a_align.xf").exists()
