@@ -97,8 +97,8 @@ json metrics_json(const BaselineRecord& record) {
 
 }  // namespace
 
-void write_record(const std::filesystem::path& file, const BaselineRecord& record) {
-  io::write_json(file, {{"tomofield", TOMOFIELD_VERSION},
+std::string record_text(const BaselineRecord& record) {
+  return io::json_text({{"tomofield", TOMOFIELD_VERSION},
                         {"options", options_json(record.options)},
                         {"origins", option_table::settings_json(record.options.shared.settings)},
                         {"metrics", metrics_json(record)}});

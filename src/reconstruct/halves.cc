@@ -50,7 +50,10 @@ struct FinishedPart {
 // a checkpoint then.
 std::optional<FinishedPart> fit_part(const Run& run, const std::optional<tune::TunedFit>& tuned,
                                      const Part& part, bool resumes) {
-  base::log_info(fmt::format("{}: {} views", part.name, part.measurement.num_fitted_views()));
+  const bool lacks_prior = !part.may_learn && run.options.fit.prior != Prior::kTv;
+  base::log_info(fmt::format(
+      "{}: {} views{}", part.name, part.measurement.num_fitted_views(),
+      lacks_prior ? ", without the learned prior, which would add the same to both halves" : ""));
   FitOutcome outcome{
       {checkpoint::fingerprint_of(run.options, part.measurement, run.processes), tuned}};
   const base::ProgressSink progress =

@@ -187,6 +187,11 @@ plan::RunPlan make_plan(const tilt_series::PlannedSeries& series,
   plan::RunPlan plan;
   processes.run_collectively([&] {
     plan = plan::require_possible_run(series, options, processes);
+    if (plan.has_too_few_views_for_trials)
+      base::log_info(fmt::format(
+          "{} views are too few for trials, which leave some of them out and need {} or more: "
+          "what they would choose has its usual value (--tv-penalty, --tv and --prior give others)",
+          plan.num_views, options::kFewestViewsOfTrials));
     if (observer.planned) observer.planned(plan);
   });
   return plan;
@@ -244,8 +249,10 @@ RunResult run(options::ReconstructOptions options, const Observer& observer,
   std::optional<tune::TunedFit> tuned;
   if (!choose_settings(run, tuned)) return {.outcome = Outcome::kStoppedTuning};
   processes.run_collectively([&] { show_trials(run, tuned); });
-  if (run.options.makes_halves()) return reconstruct_halves(run, tuned);
-  return fit_all_views(run, plan.tiles, std::move(tuned));
+  RunResult result = run.options.makes_halves() ? reconstruct_halves(run, tuned)
+                                                : fit_all_views(run, plan.tiles, std::move(tuned));
+  result.options = run.options;
+  return result;
 }
 
 Preview preview(const options::ReconstructOptions& options,

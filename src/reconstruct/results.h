@@ -33,6 +33,7 @@ struct RunResult {
   record::RunRecord record = {};  ///< the content of the JSON file beside the volume
   std::vector<std::filesystem::path> pictures = {};  ///< that were drawn
   std::filesystem::path checkpoint = {};             ///< of a run that was stopped during the fit
+  Options options = {};  ///< as they were used, with what trials have chosen
 };
 
 /// Examines a finished fit to `measured`. Every process calls it.

@@ -188,6 +188,17 @@ std::vector<HtmlCell> option_cells(const ReportedOption& option) {
           {option.meaning, ""}};
 }
 
+// Returns an option with the diameter of the beads that were masked, if nobody gave it.
+ReportedOption with_found_beads(ReportedOption option, const json& mask) {
+  const bool is_found =
+      option.flag == "--bead-diameter" && option.is_default && mask.at("bead_masking") == "masked";
+  if (!is_found) return option;
+  option.value = fmt::format("{:.3g} nm", io::number_or_nan(mask.at("bead_diameter_nm")));
+  option.origin = "found in the views";
+  option.is_default = false;
+  return option;
+}
+
 // Says whether the views of a dark series were fitted without a contrast transfer.
 bool lacks_transfer(const SeriesFiles& files, const ViewOptions& views) {
   return views.contrast == tomofield::Contrast::kDark && !measurement::has_ctf_file(files) &&
@@ -203,8 +214,11 @@ void add_input(const ReportSource& source, HtmlPage& page) {
         "tomogram. What was corrected in the stack before stays corrected.");
   using Rows = std::vector<std::vector<HtmlCell>>;
   Rows chosen{{{"option", ""}, {"value", ""}, {"from", ""}, {"meaning", ""}}}, defaults = chosen;
-  for (const ReportedOption& option : reported_options(source.files, source.options))
+  const json& mask = source.record.at("metrics").at("mask");
+  for (const ReportedOption& reported : reported_options(source.files, source.options)) {
+    const ReportedOption option = with_found_beads(reported, mask);
     (option.is_default ? defaults : chosen).push_back(option_cells(option));
+  }
   page.add_table(chosen, TableOf::kWords);
   page.begin_folded(fmt::format("{} options have their defaults", defaults.size() - 1));
   page.add_table(defaults, TableOf::kWords);

@@ -80,6 +80,16 @@ TEST_F(RunReport, ShowsWarningsAndNumbers) {
   EXPECT_FALSE(page_has("even half"));
 }
 
+TEST_F(RunReport, ShowsTheDiameterOfBeadsThatWereFound) {
+  EXPECT_FALSE(page_has("found in the views"));
+  json& mask = record_["metrics"]["mask"];
+  mask.update({{"beads", 8}, {"bead_masking", "masked"}, {"bead_diameter_nm", 10.25}});
+  EXPECT_TRUE(page_has("10.2 nm"));
+  EXPECT_TRUE(page_has("found in the views"));
+  options_.views.bead_diameter_nm = 12;
+  EXPECT_FALSE(page_has("found in the views"));
+}
+
 TEST_F(RunReport, SaysWhetherTheLearnedPriorHelped) {
   EXPECT_TRUE(page_has("Learned prior"));
   EXPECT_TRUE(page_has("+4.00 % ± 1.00"));

@@ -1,6 +1,11 @@
 #include "cli/commands/choice_file.h"
 
+#include <algorithm>
+#include <string>
+
+#include "batch/begun_settings.h"
 #include "cli/commands/run_reconstruction.h"
+#include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
 #include "reconstruct/reconstruct.h"
@@ -14,6 +19,26 @@ void add_choice_option(CLI::App& command, std::optional<std::filesystem::path>& 
       ->type_name("FILE.json")
       ->excludes("--plan")
       ->group(kHelpAllGroup);
+}
+
+void add_batch_choice_option(CLI::App& command, std::optional<std::filesystem::path>& file) {
+  command
+      .add_option("--batch-choice", file,
+                  "The choice of a batch, which --tv-penalty, --tv, --spike-rank and --prior come "
+                  "from: the report says so")
+      ->type_name("FILE.json")
+      ->group(kHelpAllGroup);
+}
+
+void add_settings_of_batch(const CLI::App& command, const std::filesystem::path& file,
+                           std::vector<Setting>& settings) {
+  for (const option_table::GivenOption& given : given_options(command, {})) {
+    if (!given.value || !batch::is_shared(given.flag)) continue;
+    settings.push_back({.option = given.flag,
+                        .value = *given.value,
+                        .file = file,
+                        .entry = "choice for all series of the batch"});
+  }
 }
 
 void write_choice(const std::filesystem::path& file, const options::ReconstructOptions& options,
