@@ -85,11 +85,53 @@ class WarpXml {
     return size_A > 0 ? std::optional(size_A) : std::nullopt;
   }
 
-  // Returns a shift of each view from a grid of movements. Nothing if the grid varies within a
-  // view or has some other number of views.
-  std::optional<std::vector<double>> shifts_of_grid(const char* name, std::size_t num_views) const {
-    if (is_zero(name)) return std::vector<double>(num_views, 0.0);
-    return values_of_grid(name, num_views);
+  // The movements along an axis: the mean of each view, and the largest distance of a node from it.
+  struct Movements {
+    std::vector<double> means;
+    double largest_rest = 0.0;
+  };
+
+  // Returns the movements of a grid, whose outer nodes lie on the edges of the views. Nothing if it
+  // has some other number of views.
+  std::optional<Movements> movements_of_grid(const char* name, std::size_t num_views) const {
+    if (is_zero(name)) return Movements{std::vector<double>(num_views, 0.0)};
+    const pugi::xml_node grid = root_.child(name);
+    const std::array sides{grid.attribute("Width").as_int(1), grid.attribute("Height").as_int(1)};
+    const int depth = grid.attribute("Depth").as_int(1);
+    if (depth != 1 && static_cast<std::size_t>(std::max(depth, 0)) != num_views)
+      return std::nullopt;
+    struct Node {
+      std::size_t view;
+      double value;
+    };
+    std::vector<Node> nodes;
+    std::vector<double> sums(static_cast<std::size_t>(depth)), weights(sums.size());
+    for (const pugi::xml_node node : grid.children("Node")) {
+      const auto place = [&](const char* axis, int count) {
+        const auto index = parse_integer(node.attribute(axis).value()).value_or(0);
+        if (index >= 0 && index < count) return static_cast<int>(index);
+        throw Error(fmt::format("'{}': a node of {} has {} {}, and there are {}", path_.string(),
+                                name, axis, index, count));
+      };
+      const double value =
+          parse(name, node.attribute("Value").value(), base::kLargestPosition_px);
+      const auto view = static_cast<std::size_t>(place("Z", depth));
+      const double weight = weight_of_node(place("X", sides[0]), sides[0]) *
+                            weight_of_node(place("Y", sides[1]), sides[1]);
+      nodes.push_back({view, value});
+      sums[view] += weight * value;
+      weights[view] += weight;
+    }
+    Movements found{std::vector<double>(num_views)};
+    for (std::size_t view = 0; view < num_views; ++view) {
+      const std::size_t at = depth == 1 ? 0 : view;
+      if (!(weights[at] > 0.0)) return std::nullopt;
+      found.means[view] = sums[at] / weights[at];
+    }
+    for (const Node& node : nodes)
+      found.largest_rest = std::max(found.largest_rest,
+                                    std::fabs(node.value - sums[node.view] / weights[node.view]));
+    return found;
   }
 
   // Returns a value of each view from a grid. Nothing if there is no such grid, or if it varies
@@ -122,6 +164,10 @@ class WarpXml {
   bool is_zero(const char* grid) const { return is_zero_grid(root_.child(grid)); }
 
  private:
+  // Returns the share of a node in the mean along a side: outer nodes count half.
+  static double weight_of_node(int index, int count) {
+    return count > 1 && (index == 0 || index == count - 1) ? 0.5 : 1.0;
+  }
   double parse(const char* name, std::string_view text, double largest) const {
     if (const auto value = parse_number(trim(text), largest)) return *value;
     throw Error(fmt::format("'{}': '{}' in {} is not a number from -{} to {}", path_.string(),
@@ -140,18 +186,27 @@ class WarpXml {
   pugi::xml_node root_;
 };
 
-// Subtracts the shifts that Warp refined beside the offsets of the axis, as Warp does.
+// Subtracts the shifts that Warp refined beside the offsets of the axis, as Warp does: the mean of
+// each view.
 void apply_movements(const WarpXml& xml, ViewTable& table) {
-  const auto shifts_x = xml.shifts_of_grid("GridMovementX", table.views.size());
-  const auto shifts_y = xml.shifts_of_grid("GridMovementY", table.views.size());
-  if (!shifts_x || !shifts_y) {
-    table.not_applied.emplace_back(
-        "GridMovementX and GridMovementY, local shifts within the views");
+  const auto along_x = xml.movements_of_grid("GridMovementX", table.views.size());
+  const auto along_y = xml.movements_of_grid("GridMovementY", table.views.size());
+  if (!along_x || !along_y) {
+    table.not_applied.emplace_back(fmt::format(
+        "GridMovementX and GridMovementY are not applied: they are not of {} views",
+        table.views.size()));
     return;
   }
   for (std::size_t i = 0; i < table.views.size(); ++i) {
-    table.views[i].shift_x_A -= (*shifts_x)[i];
-    table.views[i].shift_y_A -= (*shifts_y)[i];
+    table.views[i].shift_x_A -= along_x->means[i];
+    table.views[i].shift_y_A -= along_y->means[i];
+  }
+  const double rest_A = std::max(along_x->largest_rest, along_y->largest_rest);
+  if (rest_A > 0.0) {
+    table.not_applied.emplace_back(
+        fmt::format("of GridMovementX and GridMovementY the mean of each view is applied; what "
+                    "varies within the views, by up to {:.3g} Å, is not",
+                    rest_A));
   }
 }
 
