@@ -13,7 +13,7 @@
 #include "measurement/prepare.h"
 #include "objective/constants.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 // Predicted views take at most this memory together.
@@ -226,4 +226,4 @@ void run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
   }
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -23,7 +23,7 @@
 #include "tilt_series/resampling/binning.h"
 #include "tomofield/error.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 // Views are correlated in images of at most about this width and height.
@@ -161,4 +161,4 @@ Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::Vi
   return alignment;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -20,7 +20,7 @@
 #include "fit/stages.h"
 #include "geometry/tilt_order.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewCorrection;
@@ -234,4 +234,4 @@ std::vector<double> coarse_residuals(const JointProblem& problem,
   return fit.residuals();
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -16,7 +16,7 @@
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Describes how well a view agrees with the projection of the field that it was registered to
 /// last.
@@ -24,6 +24,7 @@ struct ViewAgreement {
   double correlation = 0.0;  ///< of both images, without trends
   /// Standard error of the shift in x and y, in pixels before binning.
   std::array<double, 2> error_px{};
+  bool operator==(const ViewAgreement&) const = default;
 };
 
 /// The result of align_jointly(), and how well each view agrees with its prediction.
@@ -75,4 +76,4 @@ std::vector<double> coarse_residuals(const JointProblem& problem,
                                      const std::vector<geometry::ViewCorrection>& start,
                                      const distributed::Communicator& processes);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

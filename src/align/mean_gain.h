@@ -3,7 +3,7 @@
 #include <cmath>
 #include <span>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// A mean over the views and its standard error.
 struct MeanGain {
@@ -22,4 +22,4 @@ inline MeanGain mean_gain(std::span<const double> gains) {
   return {sum / n, std::sqrt(squares / (n - 1) / n)};
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -12,7 +12,7 @@
 #include "measurement/held_out.h"
 #include "measurement/prepare.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr int kEvery = 8;
@@ -103,4 +103,4 @@ Comparison compare(AlignmentTrial& before, AlignmentTrial& after) {
   return compare_errors(before.fine_errors(), after.fine_errors());
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -12,7 +12,7 @@
 #include "measurement/measurement.h"
 #include "tomofield/options.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Returns the options of the fit of an AlignmentTrial.
 FitOptions held_out_fit(std::uint64_t seed);
@@ -61,4 +61,4 @@ struct Comparison {
 /// standard errors, else by those in the pixels of the views.
 Comparison compare(AlignmentTrial& before, AlignmentTrial& after);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

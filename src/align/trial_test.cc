@@ -8,7 +8,7 @@
 #include "base/stop_requested.h"
 #include "shifted_series.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewCorrection;
@@ -78,4 +78,4 @@ TEST(AlignmentTrial, StopsInEitherPartIfAsked) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -232,7 +232,8 @@ std::vector<io::OutputLock> claim_outputs(const BaselineOptions& options) {
   return io::claim_outputs({paths.volume, paths.json}, [&] { check_options(options); });
 }
 
-BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {
+BaselinePlan plan_baseline(const tilt_series::PlannedSeries& series,
+                           const BaselineOptions& options) {
   const measurement::Measurement planned =
       measurement::plan_measurement(series, options.shared.specimen);
   measurement::require_pixels(planned.geometry.width, planned.geometry.height);

@@ -53,7 +53,8 @@ struct BaselinePlan {
 
 /// Plans a run. Throws Error for options that do not fit the series, and if the machine has less
 /// memory than the run needs.
-BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options);
+BaselinePlan plan_baseline(const tilt_series::PlannedSeries& series,
+                           const BaselineOptions& options);
 
 /// The results of a run that the program prints.
 struct BaselineSummary {

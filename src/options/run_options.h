@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "align/alignment_record.h"
 #include "base/stopwatch.h"
 #include "measurement/prepare.h"
 #include "measurement/view_transfers.h"
@@ -29,9 +30,8 @@ struct ReconstructOptions : Options {
   std::shared_ptr<const io::ImageStack> images = {};  ///< views in memory, in place of files.stack
   /// [section]: changes of the alignment that the files give; empty: none.
   std::vector<geometry::ViewCorrection> corrections = {};
-  std::vector<std::int64_t> left_out = {};  ///< sections, beside views.exclude
-  /// Record of the alignment before the fit (realign/), for the metrics; null without one.
-  nlohmann::json alignment = {};
+  std::vector<std::int64_t> left_out = {};                   ///< sections, beside views.exclude
+  std::optional<alignment::AlignmentRecord> alignment = {};  ///< before the fit, if there was one
   base::Stopwatch since_start = {};  ///< runs from run_options() on, before an alignment
 
   /// Returns how the tilt series is read.

@@ -12,8 +12,7 @@ namespace tomofield::output {
 struct BoxBounds {
   field::Point low{}, high{};
 
-  BoxBounds(const field::Point& lowest, const field::Point& highest)
-      : low(lowest), high(highest) {}
+  BoxBounds(const field::Point& lowest, const field::Point& highest) : low(lowest), high(highest) {}
   explicit BoxBounds(const field::OrientedBox& box);
 
   /// Returns the first axis on which this box does not meet another one.

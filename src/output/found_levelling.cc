@@ -14,8 +14,9 @@ Levelling found_levelling(const std::filesystem::path& model) {
   constexpr double kLargest_deg = 90.0;
   const std::filesystem::path path = output_paths(model).alignment;
   if (!io::is_file(path)) {
-    throw Error(fmt::format("there is no '{}' beside '{}', which --align writes, to level it by: {}",
-                            path.string(), model.string(), kAdvice));
+    throw Error(
+        fmt::format("there is no '{}' beside '{}', which --align writes, to level it by: {}",
+                    path.string(), model.string(), kAdvice));
   }
   try {
     const nlohmann::json record = io::read_json(path);

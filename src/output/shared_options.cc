@@ -8,6 +8,7 @@ tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Op
   tilt_series::TiltSeriesOptions series{files, options.views};
   series.resample = options.fit.engine == Engine::kSlab;
   series.starts_raw = options.run.align == Alignment::kFull;
+  series.applies_local = series.resample && options.run.align == Alignment::kOff;
   series.scratch_dir = io::scratch_directory(options.run.output);
   return series;
 }

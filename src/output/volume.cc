@@ -47,11 +47,10 @@ void require_inside(const Model& model, const BoxBounds& box) {
   const BoxBounds field = field_bounds(model);
   const auto axis = box.axis_apart(field);
   if (!axis) return;
-  throw Error(
-      fmt::format("the box lies outside of the model: its {} runs from {:.6g} to {:.6g} px, the "
-                  "model's from {:.6g} to {:.6g}",
-                  "xyz"[*axis], box.low[*axis], box.high[*axis], field.low[*axis],
-                  field.high[*axis]));
+  throw Error(fmt::format(
+      "the box lies outside of the model: its {} runs from {:.6g} to {:.6g} px, the "
+      "model's from {:.6g} to {:.6g}",
+      "xyz"[*axis], box.low[*axis], box.high[*axis], field.low[*axis], field.high[*axis]));
 }
 
 // Returns the corner of the box from the view's corner in Å (docs/geometry.md).
@@ -215,10 +214,9 @@ void write_voxels(const VoxelSource& source, const OrientedBox& box, const Model
   double scale = options.invert ? -info.output_scale() : info.output_scale();
   if (options.voxel_type == VoxelType::kInt16) {
     { const io::MrcWriter probe(path, spec, processes); }  // refuses before the pass, not after it
-    const double factor =
-        int16_factor(scale * static_cast<double>(largest ? *largest
-                                                         : largest_density(source, processes)),
-                     spec.labels.front());
+    const double factor = int16_factor(
+        scale * static_cast<double>(largest ? *largest : largest_density(source, processes)),
+        spec.labels.front());
     scale *= factor;
   }
   io::MrcWriter file(path, spec, processes);

@@ -28,8 +28,10 @@ Rotation product(const Rotation& a, const Rotation& b) {
 Rotation rotation(double pitch_deg, double alpha_deg, int hand) {
   constexpr double kDegree = std::numbers::pi / 180.0;
   const double p = hand * pitch_deg * kDegree, a = hand * alpha_deg * kDegree;
-  const Rotation about_y{{{std::cos(p), 0, std::sin(p)}, {0, 1, 0}, {-std::sin(p), 0, std::cos(p)}}};
-  const Rotation about_x{{{1, 0, 0}, {0, std::cos(a), -std::sin(a)}, {0, std::sin(a), std::cos(a)}}};
+  const Rotation about_y{
+      {{std::cos(p), 0, std::sin(p)}, {0, 1, 0}, {-std::sin(p), 0, std::cos(p)}}};
+  const Rotation about_x{
+      {{1, 0, 0}, {0, std::cos(a), -std::sin(a)}, {0, std::sin(a), std::cos(a)}}};
   return product(about_y, about_x);
 }
 

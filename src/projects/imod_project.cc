@@ -131,8 +131,8 @@ void refuse_what_is_missing(Project& project, CommandEntries& tilt) {
   for (const Refusal& refusal : kRefusals) refuse(refusal.entry, refusal.why);
   if (tilt.has("ZFACTORFILE")) refuse("ZFACTORFILE", effect_of_z_factors(tilt));
   if (const auto local = tilt.path("LOCALFILE"); local && !io::is_file(*local)) {
-    refuse("LOCALFILE", fmt::format("names the local alignments '{}', which are not there",
-                                    local->string()));
+    refuse("LOCALFILE",
+           fmt::format("names the local alignments '{}', which are not there", local->string()));
   }
   if (const auto xtilt = tilt.path("XTILTFILE"); xtilt && !io::is_file(*xtilt)) {
     refuse("XTILTFILE",

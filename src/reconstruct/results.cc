@@ -219,7 +219,8 @@ Examination examine(const fit::Fit& fit, const measurement::Measurement& measure
   found.metrics.update(
       evaluate::artefacts_json(found.verdict.artefacts.speckle, found.verdict.artefacts.faces));
   found.metrics["verdict"] = verdict::verdict_json(found.verdict);
-  found.metrics["alignment"] = run.options.alignment;
+  found.metrics["alignment"] =
+      run.options.alignment ? alignment::to_json(*run.options.alignment) : nlohmann::json(nullptr);
   found.metrics["tuning"] = tuned ? tune::tuning_json(*tuned) : nlohmann::json(nullptr);
   return found;
 }

@@ -24,6 +24,7 @@ void write_report(const Run& run, const io::OutputSet& outputs, const RunResult&
                       report::run_report({.record = result.metrics,
                                           .files = run.options.files,
                                           .options = run.options,
+                                          .alignment = run.options.alignment,
                                           .volume = outputs.location_of(run.paths.volume),
                                           .pictures = pictures}));
 }

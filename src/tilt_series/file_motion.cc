@@ -6,13 +6,22 @@
 #include <cmath>
 
 #include "base/log.h"
-#include "tomofield/error.h"
 
 namespace tomofield::tilt_series {
 namespace {
 
 // Pixel sizes that differ by less are the same but for a calibration.
 constexpr double kSamePixel = 0.05;
+
+// A series that is aligned is opened several times, and says this once.
+void warn_of_what_is_left_out(const TiltSeriesOptions& options,
+                              const std::optional<SectionTable>& table) {
+  if (!options.corrections.empty() || !options.left_out.empty()) return;
+  base::log_warning(fmt::format(
+      "'{}' aligns parts of the views by themselves, which is left out with --align and with "
+      "--engine ray",
+      options.local ? options.local->string() : table->source));
+}
 
 }  // namespace
 
@@ -23,19 +32,20 @@ FileMotion::FileMotion(const TiltSeriesOptions& options, const io::ImageStack& s
       height_px_(static_cast<double>(aligned_size[1])),
       raw_width_px_(static_cast<double>(stack.header().nx)),
       raw_height_px_(static_cast<double>(stack.header().ny)) {
+  const bool has_patches = table && !table->patches.empty();
+  if (!options.applies_local) {
+    if (options.local || has_patches) warn_of_what_is_left_out(options, table);
+    return;
+  }
   if (options.local) {
     source_ = options.local->string();
     imod_ = io::read_imod_local(*options.local, stack.header().nz);
     const double ratio = imod_->pixel_size_A > 0 ? imod_->pixel_size_A / pixel_size_A : 1.0;
     if (std::abs(ratio - 1.0) > kSamePixel) scale_ = ratio;
-  } else if (table && !table->patches.empty()) {
+  } else if (has_patches) {
     source_ = table->source;
     aretomo_ = &*table;
   }
-  if (options.resample || (!imod_ && aretomo_ == nullptr)) return;
-  throw Error(fmt::format("'{}' aligns parts of the views by themselves, which --engine ray cannot "
-                          "do: leave the engine out",
-                          source_));
 }
 
 std::optional<LocalPlace> FileMotion::place_of(View& view) const {

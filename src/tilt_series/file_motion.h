@@ -9,7 +9,7 @@
 #include "io/tables/imod_local.h"
 #include "tilt_series/local_alignment.h"
 #include "tilt_series/section_table.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/series_plan.h"
 
 namespace tomofield::tilt_series {
 
@@ -18,7 +18,8 @@ namespace tomofield::tilt_series {
 class FileMotion {
  public:
   /// Reads the file. `pixel_size_A` and `aligned_size` are those of the aligned views before
-  /// binning. Throws Error if the file is not of this stack, or if views stay as they were recorded.
+  /// binning. Throws Error if the file is not of this stack. Warns of what is left out unless
+  /// `options.applies_local`.
   FileMotion(const TiltSeriesOptions& options, const io::ImageStack& stack,
              const std::optional<SectionTable>& table, double pixel_size_A,
              const std::array<std::int64_t, 2>& aligned_size);

@@ -83,7 +83,8 @@ FittedWarp warp_through(double width_px, double height_px, const LocalPlace& pla
 
 LocalPlace place_of_aretomo(std::vector<io::AreTomoPatch> patches, double rotation_deg,
                             double width_px, double height_px) {
-  const double cosine = std::cos(to_radians(rotation_deg)), sine = std::sin(to_radians(rotation_deg));
+  const double cosine = std::cos(to_radians(rotation_deg)),
+               sine = std::sin(to_radians(rotation_deg));
   return [=, all = std::move(patches)](double x, double y) {
     constexpr double kSharpness = 100.0;
     const double ax = cosine * x - sine * y, ay = sine * x + cosine * y;
@@ -116,8 +117,8 @@ LocalPlace place_of_imod(const io::ImodLocal& local, std::int64_t section, const
                                                            const Vector& point) {
     const io::ImodLocalPart& part = local.parts[static_cast<std::size_t>(
         (row * local.columns + column) * local.num_sections + section)];
-    const Vector q = projected(
-        point, {stated.tilt_deg + part.tilt_deg, stated.x_tilt_deg + part.x_tilt_deg});
+    const Vector q =
+        projected(point, {stated.tilt_deg + part.tilt_deg, stated.x_tilt_deg + part.x_tilt_deg});
     const io::ImodTransform& t = part.transform;
     return Vector{t.a11 * q[0] + t.a12 * q[1] + scale * t.shift_x_px,
                   t.a21 * q[0] + t.a22 * q[1] + scale * t.shift_y_px};

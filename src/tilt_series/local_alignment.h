@@ -18,7 +18,7 @@ using LocalPlace = std::function<geometry::ViewWarp::Vector(double x, double y)>
 /// The local alignment of a view as a warp, and how far it is from what the other program says.
 struct FittedWarp {
   geometry::ViewWarp warp;
-  double rms_px = 0.0;       ///< of the displacements over the view
+  double rms_px = 0.0;        ///< of the displacements over the view
   double left_over_px = 0.0;  ///< root mean square of their difference from the other program's
 };
 
@@ -40,13 +40,12 @@ struct ViewAngles {
 double mean_tilt_change_deg(const io::ImodLocal& local, std::int64_t section);
 
 /// Returns the places of IMOD's local alignments of a section: of points halfway up the specimen,
-/// whose global projection with `angles` is the aligned place. `stated` are the angles of the files,
-/// to which those of the parts are added. A point is projected by the parts around its X and Y,
-/// each with its own angles and transform, and the projections are interpolated linearly
+/// whose global projection with `angles` is the aligned place. `stated` are the angles of the
+/// files, to which those of the parts are added. A point is projected by the parts around its X and
+/// Y, each with its own angles and transform, and the projections are interpolated linearly
 /// (localProjFactors of tilt.f90). The aligned view has this size, and its pixels are `scale` times
 /// smaller than those of `local`.
 LocalPlace place_of_imod(const io::ImodLocal& local, std::int64_t section, const ViewAngles& stated,
-                         const ViewAngles& angles, double width_px, double height_px,
-                         double scale);
+                         const ViewAngles& angles, double width_px, double height_px, double scale);
 
 }  // namespace tomofield::tilt_series

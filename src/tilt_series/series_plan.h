@@ -9,9 +9,23 @@
 
 #include "io/images/image_stack.h"
 #include "tilt_series/resampling/align_image.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/series_options.h"
 
 namespace tomofield::tilt_series {
+
+/// One view of the series.
+struct View {
+  std::int64_t section = 0;  ///< zero-based section of the stack
+  double tilt_deg = 0.0;     ///< rotation about +Y
+  double x_tilt_deg = 0.0;   ///< rotation about +X, before the tilt
+};
+
+/// The direction of the tilt axis in the images of a stack, and what states it.
+struct StatedAxis {
+  double angle_deg = 0.0;  ///< counter-clockwise from +Y, from −180 to 180
+  std::string source;      ///< for messages: "'TS_01.mdoc', line 9"
+  bool is_given = false;   ///< by the user with --tilt-axis
+};
 
 /// A view that is kept, and how its aligned image comes from its section.
 struct PlannedView {

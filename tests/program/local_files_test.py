@@ -147,9 +147,11 @@ def test_local_alignments_of_another_series_are_refused():
     assert refused.returncode == 2
     assert "are 16 sections, and the stack has 17" in refused.stderr, refused.stderr
     write_local(folder)
-    refused = harness.tomofield("reconstruct", "tilt.com", "-o", "out.mrc", "--engine", "ray", *FIT,
-                                cwd=folder)
-    assert refused.returncode == 2 and "--engine ray" in refused.stderr, refused.stderr
+    for other in (["--engine", "ray"], ["--align", "refine"]):
+        warned = harness.succeed("reconstruct", "tilt.com", "-o", "out.mrc", *other, "--dry-run",
+                                 *FIT, cwd=folder)
+        assert "TS_01local.xf' aligns parts" in warned.stderr, warned.stderr
+        assert "left out" in warned.stderr, warned.stderr
 
 
 # ----------------------------------------------------------------------------------------- AreTomo

@@ -14,7 +14,7 @@
 #include "geometry/tilt_order.h"
 #include "tilt_series/tilt_series.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewCorrection;
@@ -262,4 +262,4 @@ std::optional<BeadAlignment> align_by_beads(const JointProblem& problem,
   return found;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

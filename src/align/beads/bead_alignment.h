@@ -10,7 +10,7 @@
 #include "distributed/communicator.h"
 #include "geometry/view_correction.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// The spot of a bead in a view that is aligned with corrections, relative to its centre. All
 /// lengths here are in pixels of the fit, but for those that align_by_beads() returns.
@@ -61,4 +61,4 @@ std::optional<BeadAlignment> align_by_beads(
     const JointProblem& problem, const std::vector<geometry::ViewCorrection>& corrections,
     const Freedoms& freedoms, const distributed::Communicator& processes);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

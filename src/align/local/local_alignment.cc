@@ -17,7 +17,7 @@
 #include "fit/stages.h"
 #include "geometry/tilt_order.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewCorrection;
@@ -150,4 +150,4 @@ LocalAlignment align_locally(const JointProblem& problem, const Freedoms& freedo
   return LocalFit(problem, freedoms, std::move(start), processes).run();
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

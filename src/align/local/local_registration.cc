@@ -7,7 +7,7 @@
 
 #include "align/mean_gain.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr double kFewestSamples = 20;  // fewer do not tell scale, trend and an affine motion
@@ -143,4 +143,4 @@ std::vector<ViewWarp> motion_that_pays(std::span<const LocalRegistration> views)
   return motion;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -5,7 +5,7 @@
 #include <functional>
 #include <utility>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 std::vector<double> differences(std::vector<double> from, const std::vector<double>& less) {
@@ -62,4 +62,4 @@ double AxisLine::lowest(double axis_deg, double step_deg, double widest_step_deg
   return axis_deg;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -6,7 +6,7 @@
 
 #include "align/mean_gain.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Looks along a line of rotations that all views share for the smallest residual. Each residual is
 /// found once.
@@ -40,4 +40,4 @@ class AxisLine {
   std::map<double, std::vector<double>> known_;
 };
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -1,6 +1,6 @@
 #pragma once
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Describes a slab in the tilted views.
 struct SlabPose {
@@ -13,4 +13,4 @@ struct FoundPose {
   SlabPose pose, error;
 };
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -52,11 +52,19 @@ Sizes sizes_of(const baseline::BaselinePlan& plan, VolumeAxes axes) {
           axes};
 }
 
-void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts& method) {
+// Prints the plan of a baseline, before other output, in a file too. Returns the volume's sizes.
+Sizes print_plan(const baseline::BaselinePlan& plan, const baseline::BaselineOptions& options,
+                 const baseline::MethodFacts& method) {
+  const Sizes sizes = sizes_of(plan, options.shared.volume.axes);
+  print_sizes(sizes);
   print("{} voxels with the margins, {} parameters; {} on {}; about {:.2f} GiB of memory\n",
         plan.num_voxels, plan.num_parameters, count_of(method.iterations, "iteration"),
         count_of(base::thread_count(), "thread"),
         static_cast<double>(plan.memory_bytes) / (1 << 30));
+  if (options.shared.fit.tune)
+    print("short trials first, that choose settings by held-out views\n");
+  flush_output();
+  return sizes;
 }
 
 void print_summary(const baseline::BaselineSummary& summary) {
@@ -68,21 +76,19 @@ void print_summary(const baseline::BaselineSummary& summary) {
   print("\n");
 }
 
+// Checks the views and prints what a baseline would do.
+void rehearse(const baseline::BaselineOptions& options, const baseline::MethodFacts& method,
+              const DryRun& dry_run) {
+  const tilt_series::MeasuredSeries series(output::series_options(options.files, options.shared));
+  const Sizes sizes = print_plan(baseline::plan_baseline(series, options), options, method);
+  if (dry_run.grid) write_grid(*dry_run.grid, sizes);
+}
+
 // Runs a baseline whose options have been checked.
 void run_method(const baseline::BaselineOptions& options, const baseline::MethodFacts& method,
-                const baseline::BaselinePaths& paths, const DryRun& dry_run) {
-  const Options& shared = options.shared;
-  tilt_series::TiltSeriesOptions input = output::series_options(options.files, shared);
-  input.keep_views = !dry_run.is_wanted;
-  const tilt_series::TiltSeries series(input);
-  const baseline::BaselinePlan plan = baseline::plan_baseline(series, options);
-  const Sizes sizes = sizes_of(plan, shared.volume.axes);
-  print_sizes(sizes);
-  print_plan(plan, method);
-  if (shared.fit.tune) print("short trials first, that choose settings by held-out views\n");
-  flush_output();  // the plan comes before other output, in a file too
-  if (dry_run.is_wanted && dry_run.grid) write_grid(*dry_run.grid, sizes);
-  if (dry_run.is_wanted) return;
+                const baseline::BaselinePaths& paths) {
+  const tilt_series::TiltSeries series(output::series_options(options.files, options.shared));
+  print_plan(baseline::plan_baseline(series, options), options, method);
   io::OutputSet results;
   const baseline::BaselineSummary summary = baseline::run_baseline(
       series, options, {make_progress_bar("tune"), make_progress_bar("baseline")});
@@ -103,17 +109,20 @@ void run(BaselineArguments<Method>& arguments, const Origins& origins) {
     method.non_negative = arguments.non_negative.value_or(shared.views.contrast != Contrast::kDark);
   const baseline::BaselineOptions options{arguments.choices.files, shared, method,
                                           arguments.ctf_correction};
-  std::vector<io::OutputLock> locks;
-  if (arguments.dry_run.is_wanted)
-    baseline::check_options(options);
-  else
-    locks = baseline::claim_outputs(options);
   const baseline::BaselinePaths paths = baseline::baseline_paths(shared.run.output);
-  check_trace_file(arguments.trace, {paths.volume, paths.json}, options.files,
-                   shared.run.overwrite);
-  run_traced(arguments.dry_run.is_wanted ? std::nullopt : arguments.trace,
-             distributed::Communicator::alone(),
-             [&] { run_method(options, method.facts(), paths, arguments.dry_run); });
+  const auto check_trace = [&] {
+    check_trace_file(arguments.trace, {paths.volume, paths.json}, options.files,
+                     shared.run.overwrite);
+  };
+  if (arguments.dry_run.is_wanted) {
+    baseline::check_options(options);
+    check_trace();
+    return rehearse(options, method.facts(), arguments.dry_run);
+  }
+  const std::vector<io::OutputLock> locks = baseline::claim_outputs(options);
+  check_trace();
+  run_traced(arguments.trace, distributed::Communicator::alone(),
+             [&] { run_method(options, method.facts(), paths); });
 }
 
 // Registers the options of every method.

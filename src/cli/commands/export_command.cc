@@ -94,8 +94,8 @@ output::Levelling levelling_of(const ExportArguments& arguments) {
   constexpr double kLargest_deg = 90.0;
   if (arguments.level.empty()) return {};
   if (arguments.level == kFound) return output::found_levelling(arguments.model);
-  const auto angles = parse_numbers(arguments.level, 2,
-                                    "PITCH,X_TILT in degrees, or 'found' (--level)");
+  const auto angles =
+      parse_numbers(arguments.level, 2, "PITCH,X_TILT in degrees, or 'found' (--level)");
   for (const double angle : angles)
     if (std::abs(angle) >= kLargest_deg)
       throw Error(fmt::format("--level {} has an angle that is not below 90°", arguments.level));
@@ -108,8 +108,9 @@ double voxel_px_of(const ExportArguments& arguments, const Model& model) {
 
 OrientedBox box_between_corners(const std::string& corners, double voxel_px) {
   const std::vector<double> numbers =
-      parse_numbers(corners, 6, "x0,y0,z0,x1,y1,z1 (--box); the side of boxes alone is for "
-                                "--particles");
+      parse_numbers(corners, 6,
+                    "x0,y0,z0,x1,y1,z1 (--box); the side of boxes alone is for "
+                    "--particles");
   const field::Point low = point(numbers.data()), high = point(numbers.data() + 3);
   for (std::size_t a = 0; a < 3; ++a) {
     const double voxels = (high[a] - low[a]) / voxel_px;
@@ -207,8 +208,8 @@ void export_particles(const ExportArguments& arguments, const Model& model) {
   const exchange::ParticleBoxes boxes{.size = static_cast<std::int64_t>(side),
                                       .voxel_px = voxel_px_of(arguments, model),
                                       .levelling = levelling_of(arguments)};
-  exchange::ParticleList list = exchange::read_particle_list(arguments.particles, arguments.model,
-                                                             model, arguments.tomogram);
+  exchange::ParticleList list =
+      exchange::read_particle_list(arguments.particles, arguments.model, model, arguments.tomogram);
   const std::size_t count = list.particles.size();
   io::OutputSet results;
   const std::size_t num_cut = exchange::write_particles(
@@ -218,9 +219,10 @@ void export_particles(const ExportArguments& arguments, const Model& model) {
         arguments.output.string(), count, boxes.size, boxes.voxel_px * model.pixel_size_A,
         exchange::particle_star(arguments.output).string());
   if (num_cut == 0) return;
-  print("{} of the {} boxes reach outside the region that was reconstructed: what lies there is a "
-        "guess, or 0\n",
-        num_cut, count);
+  print(
+      "{} of the {} boxes reach outside the region that was reconstructed: what lies there is a "
+      "guess, or 0\n",
+      num_cut, count);
 }
 
 void run_export(ExportArguments& arguments) {
@@ -262,15 +264,18 @@ void add_box_options(CLI::App& command, ExportArguments& arguments) {
                           ->needs(centre)
                           ->group(group);
   centre->needs(size);
-  CLI::Option* rotate = command.add_option("--rotate", arguments.rotation,
-                  "RELION's Euler angles in degrees (rlnAngleRot, rlnAngleTilt, rlnAnglePsi). The "
-                  "box turns about its centre, so that a particle appears in the orientation of "
-                  "its reference")
-      ->delimiter(',')
-      ->expected(3)
-      ->type_name("ROT,TILT,PSI")
-      ->check(finite)
-      ->group(group);
+  CLI::Option* rotate =
+      command
+          .add_option(
+              "--rotate", arguments.rotation,
+              "RELION's Euler angles in degrees (rlnAngleRot, rlnAngleTilt, rlnAnglePsi). The "
+              "box turns about its centre, so that a particle appears in the orientation of "
+              "its reference")
+          ->delimiter(',')
+          ->expected(3)
+          ->type_name("ROT,TILT,PSI")
+          ->check(finite)
+          ->group(group);
   command
       .add_option("--level", arguments.level,
                   "Turn a tilted specimen back by what --align found, or by two angles in degrees, "
@@ -317,9 +322,10 @@ void add_export_command(CLI::App& program) {
   add_box_options(*command, *arguments);
   CLI::Option* particles =
       command
-          ->add_option("--particles", arguments->particles,
-                       "Cut out particles (STAR of RELION 5, or text of model2point) into one stack "
-                       "of subvolumes, with a STAR file beside it")
+          ->add_option(
+              "--particles", arguments->particles,
+              "Cut out particles (STAR of RELION 5, or text of model2point) into one stack "
+              "of subvolumes, with a STAR file beside it")
           ->type_name("FILE")
           ->excludes(compact);
   command

@@ -57,10 +57,10 @@ std::vector<std::size_t> rows_of_tomogram(const fs::path& path, const io::StarTa
   if (names.empty()) throw Error(fmt::format("'{}' has no particles", path.string()));
   std::string first = "'" + *names.begin() + "'";
   if (names.size() > 1) first += fmt::format(" to '{}'", *names.rbegin());
-  throw Error(fmt::format("'{}' has particles of {} tomogram{} ({}), and none of '{}': name one "
-                          "with --tomogram",
-                          path.string(), names.size(), names.size() == 1 ? "" : "s", first,
-                          wanted));
+  throw Error(
+      fmt::format("'{}' has particles of {} tomogram{} ({}), and none of '{}': name one "
+                  "with --tomogram",
+                  path.string(), names.size(), names.size() == 1 ? "" : "s", first, wanted));
 }
 
 /// Returns the pixel size of the tilt series from which a particle comes.
@@ -89,8 +89,8 @@ Particle relion_particle(const io::StarRow& row, const output::ModelInfo& model,
   constexpr double kLargest_A = 1e8;
   Particle particle{.place_px = output::VolumeFrame(model).centre()};
   for (std::size_t a = 0; a < 3; ++a)
-    particle.place_px[a] += (row.number(kCoordinates[a], kLargest_A) + kCentre_px * unbinned_A) /
-                            model.pixel_size_A;
+    particle.place_px[a] +=
+        (row.number(kCoordinates[a], kLargest_A) + kCentre_px * unbinned_A) / model.pixel_size_A;
   if (const auto angles = angles_of(row, kSubtomogramAngles))
     particle.volume_from_box = field::rotation_from_euler((*angles)[0], (*angles)[1], (*angles)[2]);
   return particle;
@@ -114,8 +114,7 @@ ParticleList read_relion(const fs::path& path, const fs::path& model_file,
       optics != tables.end())
     list.optics = *optics;
   for (std::size_t row = 0; row < list.table.num_rows(); ++row) {
-    const auto unbinned_A =
-        series_pixel_A(path, list.optics, list.table.find(row, kOpticsGroup));
+    const auto unbinned_A = series_pixel_A(path, list.optics, list.table.find(row, kOpticsGroup));
     list.particles.push_back(relion_particle(io::StarRow(path, list.table, row), model,
                                              unbinned_A.value_or(unbinned_pixel_A(model))));
   }

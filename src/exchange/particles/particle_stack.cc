@@ -87,8 +87,7 @@ std::size_t write_particles(const output::Model& model, ParticleList list,
   const base::TraceSpan span("write particles");
   const output::VolumeFrame frame(model, boxes.levelling);
   std::vector<OrientedBox> places;
-  for (const Particle& particle : list.particles)
-    places.push_back(box_of(particle, frame, boxes));
+  for (const Particle& particle : list.particles) places.push_back(box_of(particle, frame, boxes));
   require_some_inside(model, places);
   io::MrcSpec spec = stack_of(boxes.size, places.size(), model, boxes.voxel_px, options);
   double scale = options.invert ? -model.output_scale() : model.output_scale();

@@ -13,8 +13,8 @@ namespace tomofield::exchange {
 
 /// The boxes in which particles are cut out.
 struct ParticleBoxes {
-  std::int64_t size = 0;  ///< voxels along each side
-  double voxel_px = 1.0;  ///< side of a voxel in pixels of the model
+  std::int64_t size = 0;          ///< voxels along each side
+  double voxel_px = 1.0;          ///< side of a voxel in pixels of the model
   output::Levelling levelling{};  ///< of the volume to which places and orientations refer
 };
 

@@ -145,8 +145,7 @@ void write_ome_zarr(const std::filesystem::path& mrc, const std::filesystem::pat
   AtomicFolder folder(zarr, kZarrMarker);
   const std::filesystem::path root = folder.temporary_path();
   std::vector<ZarrArray> arrays;
-  arrays.emplace_back(root / "0", Size{header.nx, header.ny, header.nz}, header.mode,
-                      version);
+  arrays.emplace_back(root / "0", Size{header.nx, header.ny, header.nz}, header.mode, version);
   copy_volume(volume, arrays.back());
   while (std::ranges::max(arrays.back().size()) > ZarrArray::kSide) {
     Size half = arrays.back().size();

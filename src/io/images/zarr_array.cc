@@ -21,9 +21,7 @@ namespace {
 
 const char* pick(MrcMode mode, const char* of_int16, const char* of_float16,
                  const char* of_float32) {
-  return mode == MrcMode::kInt16     ? of_int16
-         : mode == MrcMode::kFloat16 ? of_float16
-                                     : of_float32;
+  return mode == MrcMode::kInt16 ? of_int16 : mode == MrcMode::kFloat16 ? of_float16 : of_float32;
 }
 
 void make_folders(const fs::path& folder) {
@@ -74,9 +72,7 @@ nlohmann::json description_3(const nlohmann::json& shape, const nlohmann::json& 
 
 ZarrArray::ZarrArray(const fs::path& folder, const std::array<std::int64_t, 3>& size, MrcMode mode,
                      ZarrVersion version)
-    : chunks_(version == ZarrVersion::k05 ? folder / "c" : folder),
-      size_(size),
-      mode_(mode) {
+    : chunks_(version == ZarrVersion::k05 ? folder / "c" : folder), size_(size), mode_(mode) {
   make_folders(folder);
   const nlohmann::json shape{size[2], size[1], size[0]}, chunk{kSide, kSide, kSide};
   const bool is_3 = version == ZarrVersion::k05;

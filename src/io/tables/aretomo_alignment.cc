@@ -98,16 +98,18 @@ AreTomoRow parse_row(const std::filesystem::path& path, const TextLine& line, bo
   return {*section, line.number, used[0], used[1], used[2], used[3], used[4]};
 }
 
-// Adds a row "t p x y dx dy good" of the local alignment, where t counts the rows of the global one.
+// Adds a row "t p x y dx dy good" of the local alignment, where t counts the rows of the global
+// one.
 void add_patch(const std::filesystem::path& path, const TextLine& line,
                AreTomoAlignment& alignment) {
   constexpr std::size_t kColumns = 7;
   const auto words = split_words(line.text);
   const auto row = words.size() == kColumns ? parse_integer(words[0]) : std::nullopt;
   if (!row || *row < 0 || *row >= std::ssize(alignment.rows))
-    throw_row_error(path, line,
-                    fmt::format("a row of AreTomo's local alignment of {} views: t p x y dx dy good",
-                                alignment.rows.size()));
+    throw_row_error(
+        path, line,
+        fmt::format("a row of AreTomo's local alignment of {} views: t p x y dx dy good",
+                    alignment.rows.size()));
   alignment.patches.resize(alignment.rows.size());
   const auto good = parse_number(words[6]);
   if (!good || *good < 0.9) return;  // as AreTomo does; such a row may have nan

@@ -46,7 +46,8 @@ Head parse_head(const std::filesystem::path& path, const TextLine& line) {
   const std::vector<double> n = numbers_of(path, line);
   if (n.size() < kFewestOfHead) refuse_line(path, line, kForm);
   for (const double count : {n[0], n[1]})
-    if (count < 2 || count > kMostParts || count != std::round(count)) refuse_line(path, line, kForm);
+    if (count < 2 || count > kMostParts || count != std::round(count))
+      refuse_line(path, line, kForm);
   if (n[4] <= 0 || n[5] <= 0) refuse_line(path, line, kForm);
   Head head;
   head.grid = {.columns = static_cast<std::int64_t>(n[0]),
@@ -81,7 +82,7 @@ class Numbers {
 void read_part(const std::filesystem::path& path, const Head& head, Numbers& numbers,
                std::span<ImodLocalPart> of_section) {
   const auto count = std::ssize(of_section);
-  const auto set = [&](double ImodLocalPart::* angle) {
+  const auto set = [&](double ImodLocalPart::*angle) {
     const auto angles = numbers.next(count);
     for (std::size_t i = 0; i < of_section.size(); ++i) of_section[i].*angle = angles[i];
   };
@@ -93,9 +94,10 @@ void read_part(const std::filesystem::path& path, const Head& head, Numbers& num
     part.transform = {t[0], t[1], t[2], t[3], t[4], t[5]};
     constexpr double kSmallest = 0.5;  // no part is half as large as another
     if (t[0] * t[3] - t[1] * t[2] < kSmallest || std::abs(part.tilt_deg) > base::kLargestAngle_deg)
-      throw Error(fmt::format("'{}' has a local alignment by {} {} {} {} {} {}, which no part of a "
-                              "view can have: the file is damaged, or is not of this series",
-                              path.string(), t[0], t[1], t[2], t[3], t[4], t[5]));
+      throw Error(
+          fmt::format("'{}' has a local alignment by {} {} {} {} {} {}, which no part of a "
+                      "view can have: the file is damaged, or is not of this series",
+                      path.string(), t[0], t[1], t[2], t[3], t[4], t[5]));
   }
 }
 

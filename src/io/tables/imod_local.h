@@ -17,8 +17,8 @@ struct ImodLocalPart {
   ImodTransform transform;
 };
 
-/// IMOD's local alignments (LOCALFILE of tilt.com, written by tiltalign): a regular grid of places of
-/// the specimen. Lengths are pixels of the images that were aligned.
+/// IMOD's local alignments (LOCALFILE of tilt.com, written by tiltalign): a regular grid of places
+/// of the specimen. Lengths are pixels of the images that were aligned.
 struct ImodLocal {
   std::int64_t columns = 0, rows = 0;
   /// Place of the first column and row, as a pixel of the aligned image that counts from 1, and the

@@ -113,8 +113,7 @@ class WarpXml {
         throw Error(fmt::format("'{}': a node of {} has {} {}, and there are {}", path_.string(),
                                 name, axis, index, count));
       };
-      const double value =
-          parse(name, node.attribute("Value").value(), base::kLargestPosition_px);
+      const double value = parse(name, node.attribute("Value").value(), base::kLargestPosition_px);
       const auto view = static_cast<std::size_t>(place("Z", depth));
       const double weight = weight_of_node(place("X", sides[0]), sides[0]) *
                             weight_of_node(place("Y", sides[1]), sides[1]);
@@ -192,9 +191,9 @@ void apply_movements(const WarpXml& xml, ViewTable& table) {
   const auto along_x = xml.movements_of_grid("GridMovementX", table.views.size());
   const auto along_y = xml.movements_of_grid("GridMovementY", table.views.size());
   if (!along_x || !along_y) {
-    table.not_applied.emplace_back(fmt::format(
-        "GridMovementX and GridMovementY are not applied: they are not of {} views",
-        table.views.size()));
+    table.not_applied.emplace_back(
+        fmt::format("GridMovementX and GridMovementY are not applied: they are not of {} views",
+                    table.views.size()));
     return;
   }
   for (std::size_t i = 0; i < table.views.size(); ++i) {

@@ -1,4 +1,4 @@
-#include "realign/alignment_record.h"
+#include "realign/alignment_origin.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -26,10 +26,8 @@ class AlignmentRecord : public ::testing::Test {
  protected:
   AlignmentRecord() {
     write_series(scratch_.path(), 0);
-    tilt_series::TiltSeriesOptions input = run().input();
-    input.look_at_views = false;
-    record_ = alignment_record(tilt_series::TiltSeries(input), found(), 1.5);
-    record_.update(alignment_origin(run()));
+    record_ = alignment::to_json(alignment::make_record(
+        alignment_origin(run()), tilt_series::PlannedSeries(run().input()), found(), 1.5));
     io::write_json(file_, record_);
   }
 
@@ -62,12 +60,12 @@ class AlignmentRecord : public ::testing::Test {
   }
 
   // Returns an alignment with shifts and local motion, which leaves the third view out.
-  static align::Alignment found() {
-    align::Alignment made;
+  static alignment::Alignment found() {
+    alignment::Alignment made;
     made.is_accepted = true;
     made.held_out = {.before = 0.5, .after = 0.4, .gain = {.mean = 0.1, .error = 0.01}};
     made.local =
-        align::LocalTrial{.held_out = made.held_out, .steps_px = {0.1}, .is_accepted = true};
+        alignment::LocalTrial{.held_out = made.held_out, .steps_px = {0.1}, .is_accepted = true};
     made.joint.agreement.resize(kNumViews);
     made.unaligned = {2};
     for (int view = 0; view < kNumViews; ++view) {
@@ -85,7 +83,7 @@ class AlignmentRecord : public ::testing::Test {
 
   // Returns why a run does not resume from the record, or "" if it does.
   std::string refusal(const options::ReconstructOptions& options) const {
-    const json origin = alignment_origin(options);
+    const alignment::AlignmentOrigin origin = alignment_origin(options);
     return testing::message_of<Error>([&] { read_alignment_record(file_, origin); });
   }
 
@@ -97,8 +95,8 @@ class AlignmentRecord : public ::testing::Test {
 
 TEST_F(AlignmentRecord, IsReadAsItWasWritten) {
   options::ReconstructOptions options = run();
-  const json read = read_alignment_record(file_, alignment_origin(options));
-  EXPECT_EQ(read, record_);
+  const alignment::AlignmentRecord read = read_alignment_record(file_, alignment_origin(options));
+  EXPECT_EQ(alignment::to_json(read), record_);
   apply_alignment(read, options);
   EXPECT_EQ(options.corrections, found().corrections);
   EXPECT_EQ(options.left_out, (std::vector<std::int64_t>{2}));
@@ -139,9 +137,9 @@ TEST_F(AlignmentRecord, IsOfTheOptionsThatItDependsOn) {
 TEST_F(AlignmentRecord, KnowsThatNoneIsNoFile) {
   options::ReconstructOptions options = run();
   options.files.ctf = "none";
-  EXPECT_FALSE(alignment_origin(options)["series"]["files"].contains("ctf"));
+  EXPECT_FALSE(alignment_origin(options).files.contains("ctf"));
   options.files.ctf = scratch_.write("series.defocus", "1 1 0 0 3000 2\n");
-  EXPECT_TRUE(alignment_origin(options)["series"]["files"].contains("ctf"));
+  EXPECT_TRUE(alignment_origin(options).files.contains("ctf"));
 }
 
 TEST_F(AlignmentRecord, IsRefusedIfItIsDamaged) {
@@ -156,7 +154,6 @@ TEST_F(AlignmentRecord, IsRefusedIfItIsDamaged) {
   refuse(whole.substr(0, whole.size() / 2), "");
   refuse("[1, 2]", "series");
   for (const auto& part : record_.items()) {
-    if (part.key() == "steps_px" || part.key() == "seconds") continue;  // these are not used
     json damaged = record_;
     damaged.erase(part.key());
     refuse(io::json_text(damaged), "");

@@ -1,4 +1,4 @@
-#include "tilt_series/views_at_once.h"
+#include "tilt_series/own_views.h"
 
 #include <gtest/gtest.h>
 
