@@ -15,7 +15,7 @@
 #include "io/tables/alignment_files.h"
 #include "io/tables/view_table.h"
 #include "tilt_series/contradictions.h"
-#include "tilt_series/file_motion.h"
+#include "tilt_series/local/file_motion.h"
 #include "tilt_series/resampling/binning.h"
 #include "tilt_series/section_table.h"
 #include "tilt_series/tilt_angles.h"

@@ -103,10 +103,15 @@ def test_names_are_filled_in_for_each_series(data):
     files = [flag for flag, value in options_of_reconstruct().items()
              if value.strip("` ").startswith("FILE") and flag not in OWN]
     assert {"--even", "--odd", "--mdoc", "--xf", "--aln", "--ctf", "--mask", "--local"} <= set(files)
+    files.remove("--fiducials")  # these are read with the views, after the plan
+    # What an option needs beside it.
+    others = {"--even": ["--odd", "{folder}/{name}.mrc"], "--odd": ["--even", "{folder}/{name}.mrc"],
+              "--mtf": ["--defocus", 3]}
     for flag in files:
-        refused = harness.tomofield("batch", os.path.join(data, "[ab].mrc"), "--tlt",
-                                    "{folder}/{name}.tlt", *QUICK, "--dry-run", "-o", folder, flag,
-                                    "{folder}/of_{name}.none")
+        angles = [] if flag == "--tlt" else ["--tlt", "{folder}/{name}.tlt"]
+        refused = harness.tomofield("batch", os.path.join(data, "[ab].mrc"), *angles, *QUICK,
+                                    "--dry-run", "-o", folder, flag, "{folder}/of_{name}.none",
+                                    *others.get(flag, []))
         assert refused.returncode == 2, (flag, refused.stdout)
         for name in "ab":
             assert os.path.join(data, f"of_{name}.none") in refused.stderr, (flag, refused.stderr)

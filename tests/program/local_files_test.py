@@ -118,14 +118,14 @@ def test_local_alignments_of_imod_are_applied():
     write_etomo(folder, "LOCALFILE TS_01local.xf")
     without, _ = distances(folder, "tilt.com", "--ignore", "LOCALFILE")
     found, printed = distances(folder, "tilt.com")
-    assert found.max() < 0.35 and found.mean() < 0.5 * without.mean(), (found, without)
+    assert found.max() < 0.5 and found.mean() < 0.5 * without.mean(), (found, without)
     assert "TS_01local.xf from tilt.com: LOCALFILE" in printed.stdout, printed.stdout
     assert f"in {len(TILTS)} views" in printed.stderr, printed.stderr
     # The option alone, and alignments of images with pixels twice as large.
     write_local(folder, "binned.xf", scale=2)
     found, _ = distances(folder, "TS_01.st", "--tlt", "TS_01.tlt", "--thickness", THICKNESS,
                          "--local", "binned.xf")
-    assert found.max() < 0.35, found
+    assert found.max() < 0.5, found
 
 
 def test_local_alignments_of_another_series_are_refused():
@@ -160,6 +160,8 @@ AXIS, GLOBAL_SHIFT = 4.0, np.array([2.5, -1.5])
 PATCHES = [(x, y) for y in (-26, 0, 26) for x in (-28, 0, 28)]
 PATCH_SHIFTS = np.random.default_rng(5).normal(0, 1.5, (len(TILTS), len(PATCHES), 2))
 BAD = 4  # AreTomo calls this patch bad in all views
+# The shifts of neighbouring patches are as different as can be, and AreTomo's weights fall off within
+# a fifteenth of the view: the spline of the program leaves half a pixel of that beside a patch.
 
 
 def aretomo_place(bead, view):
@@ -198,7 +200,7 @@ def test_patch_shifts_of_aretomo_are_applied():
     without, _ = distances(folder, *arguments)
     write_aln(folder)
     found, printed = distances(folder, *arguments)
-    assert found.max() < 0.35 and found.mean() < 0.5 * without.mean(), (found, without)
+    assert found.max() < 0.6 and found.mean() < 0.5 * without.mean(), (found, without)
     assert f"local alignment of 'TS_01.aln' in {len(TILTS)} views" in printed.stderr, printed.stderr
 
 

@@ -1,7 +1,12 @@
 #include <fmt/format.h>
 
-#include <array>
+#include <algorithm>
+#include <cmath>
+#include <optional>
 #include <pugixml.hpp>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "io/tables/text_lines.h"
 #include "io/tables/view_table.h"
@@ -95,41 +100,25 @@ class WarpXml {
   // has some other number of views.
   std::optional<Movements> movements_of_grid(const char* name, std::size_t num_views) const {
     if (is_zero(name)) return Movements{std::vector<double>(num_views, 0.0)};
-    const pugi::xml_node grid = root_.child(name);
-    const std::array sides{grid.attribute("Width").as_int(1), grid.attribute("Height").as_int(1)};
-    const int depth = grid.attribute("Depth").as_int(1);
-    if (depth != 1 && static_cast<std::size_t>(std::max(depth, 0)) != num_views)
+    const auto depth =
+        static_cast<std::size_t>(std::max(root_.child(name).attribute("Depth").as_int(1), 0));
+    if (depth != 1 && depth != num_views) return std::nullopt;
+    const std::vector<GridNode> nodes = nodes_of_grid(name);
+    std::vector<double> sums(depth), weights(depth);
+    for (const GridNode& node : nodes) {
+      sums[node.layer] += node.weight * node.value;
+      weights[node.layer] += node.weight;
+    }
+    if (std::ranges::any_of(weights, [](double weight) { return !(weight > 0.0); }))
       return std::nullopt;
-    struct Node {
-      std::size_t view;
-      double value;
-    };
-    std::vector<Node> nodes;
-    std::vector<double> sums(static_cast<std::size_t>(depth)), weights(sums.size());
-    for (const pugi::xml_node node : grid.children("Node")) {
-      const auto place = [&](const char* axis, int count) {
-        const auto index = parse_integer(node.attribute(axis).value()).value_or(0);
-        if (index >= 0 && index < count) return static_cast<int>(index);
-        throw Error(fmt::format("'{}': a node of {} has {} {}, and there are {}", path_.string(),
-                                name, axis, index, count));
-      };
-      const double value = parse(name, node.attribute("Value").value(), base::kLargestPosition_px);
-      const auto view = static_cast<std::size_t>(place("Z", depth));
-      const double weight = weight_of_node(place("X", sides[0]), sides[0]) *
-                            weight_of_node(place("Y", sides[1]), sides[1]);
-      nodes.push_back({view, value});
-      sums[view] += weight * value;
-      weights[view] += weight;
-    }
-    Movements found{std::vector<double>(num_views)};
+    Movements found;
     for (std::size_t view = 0; view < num_views; ++view) {
-      const std::size_t at = depth == 1 ? 0 : view;
-      if (!(weights[at] > 0.0)) return std::nullopt;
-      found.means[view] = sums[at] / weights[at];
+      const std::size_t layer = depth == 1 ? 0 : view;
+      found.means.push_back(sums[layer] / weights[layer]);
     }
-    for (const Node& node : nodes)
+    for (const GridNode& node : nodes)
       found.largest_rest = std::max(found.largest_rest,
-                                    std::fabs(node.value - sums[node.view] / weights[node.view]));
+                                    std::fabs(node.value - sums[node.layer] / weights[node.layer]));
     return found;
   }
 
@@ -163,10 +152,36 @@ class WarpXml {
   bool is_zero(const char* grid) const { return is_zero_grid(root_.child(grid)); }
 
  private:
+  // A node of a grid: its layer, its value, and its share in the mean of the layer.
+  struct GridNode {
+    std::size_t layer;
+    double value, weight;
+  };
+
+  std::vector<GridNode> nodes_of_grid(const char* name) const {
+    const pugi::xml_node grid = root_.child(name);
+    std::vector<GridNode> nodes;
+    for (const pugi::xml_node node : grid.children("Node")) {
+      const auto place = [&](const char* axis, const char* side) {
+        const int count = grid.attribute(side).as_int(1);
+        const auto index = parse_integer(node.attribute(axis).value()).value_or(0);
+        if (index >= 0 && index < count) return std::pair{static_cast<int>(index), count};
+        throw Error(fmt::format("'{}': a node of {} has {} {}, and there are {}", path_.string(),
+                                name, axis, index, count));
+      };
+      const double value = parse(name, node.attribute("Value").value(), base::kLargestPosition_px);
+      nodes.push_back({static_cast<std::size_t>(place("Z", "Depth").first), value,
+                       weight_of_node(place("X", "Width")) * weight_of_node(place("Y", "Height"))});
+    }
+    return nodes;
+  }
+
   // Returns the share of a node in the mean along a side: outer nodes count half.
-  static double weight_of_node(int index, int count) {
+  static double weight_of_node(const std::pair<int, int>& place) {
+    const auto [index, count] = place;
     return count > 1 && (index == 0 || index == count - 1) ? 0.5 : 1.0;
   }
+
   double parse(const char* name, std::string_view text, double largest) const {
     if (const auto value = parse_number(trim(text), largest)) return *value;
     throw Error(fmt::format("'{}': '{}' in {} is not a number from -{} to {}", path_.string(),

@@ -1,4 +1,4 @@
-#include "tilt_series/local_alignment.h"
+#include "tilt_series/local/local_alignment.h"
 
 #include <algorithm>
 #include <array>

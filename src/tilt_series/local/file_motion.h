@@ -7,7 +7,7 @@
 
 #include "geometry/view_warp.h"
 #include "io/tables/imod_local.h"
-#include "tilt_series/local_alignment.h"
+#include "tilt_series/local/local_alignment.h"
 #include "tilt_series/section_table.h"
 #include "tilt_series/series_plan.h"
 

@@ -1,4 +1,4 @@
-#include "tilt_series/file_motion.h"
+#include "tilt_series/local/file_motion.h"
 
 #include <fmt/format.h>
 
