@@ -12,11 +12,11 @@
 
 #include "base/threads/parallel.h"
 #include "checkpoint/checkpoint.h"
+#include "checkpoint/tile_record.h"
 #include "compact/compress.h"
 #include "io/images/mrc.h"
 #include "small_fit.h"
-#include "tune/trial_file.h"
-#include "tune/trial_settings.h"
+#include "tune/trial_record.h"
 #include "tune/tuning.h"
 #include "uneven_model.h"
 
@@ -194,7 +194,7 @@ void write_trials(const fs::path& folder) {
   using namespace tune;
   const TrialSettings settings{Penalty::kSmooth, 5, 12, 30};
   const tune::HeldOutScore score{1.25, {1.0, 1.5}};
-  const nlohmann::json trial = tune::trial_json(settings_json(settings), score, 2.5);
+  const nlohmann::json trial = tune::to_json(tune::FitTrial{settings, score, 2.5});
   write(folder / "file", nlohmann::json{{"fingerprint", "{}"}, {"trials", {trial, trial}}}.dump());
   const TunedFit tuned{
       .settings = settings, .trials = {{settings, score, 2.5}}, .predicted_views = {3, 9}};
@@ -204,11 +204,17 @@ void write_trials(const fs::path& folder) {
 // Writes the tiles of a run as checkpoint::FinishedTiles does.
 void write_tiles(const fs::path& folder, const output::Model& model) {
   fs::create_directories(folder);
-  const nlohmann::json tile{{"rows", {0, 64}},           {"residual", 1.0},
-                            {"seconds_fitting", 2.0},    {"seconds_compressing", 1.0},
-                            {"parameters", 10},          {"bytes", 100},
-                            {"mean_square_change", 0.1}, {"variance", 1.0},
-                            {"decibels", 0.1},           {"volume", 9.0}};
+  const std::vector<checkpoint::FinishedTile> tiles{{.rows = {0, 64},
+                                                     .fitted_rows = {0, 80},
+                                                     .residual = 1.0,
+                                                     .seconds_fitting = 2.0,
+                                                     .seconds_compressing = 1.0,
+                                                     .report = {.parameters = 10,
+                                                                .bytes = 100,
+                                                                .mean_square_change = 0.1,
+                                                                .variance = 1.0,
+                                                                .decibels = 0.1,
+                                                                .volume = 9.0}}};
   const auto numbers_of = [](const std::string& text) {
     return std::vector<std::int64_t>(text.begin(), text.end());
   };
@@ -217,7 +223,7 @@ void write_tiles(const fs::path& folder, const output::Model& model) {
       .doubles = {},
       .integers = {{"fingerprint", numbers_of("the fingerprint")},
                    {"budget", numbers_of("0.1dB")},
-                   {"tiles", numbers_of(nlohmann::json::array({tile}).dump())}}};
+                   {"tiles", numbers_of(checkpoint::to_json(tiles).dump())}}};
   output::save_coded(folder / "tiles", *model.coded, model, &state);
 }
 

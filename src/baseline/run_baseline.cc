@@ -27,6 +27,7 @@
 #include "option_table/setting.h"
 #include "option_table/values.h"
 #include "output/metrics.h"
+#include "output/output_paths.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
 #include "projection/sample_grid.h"
@@ -176,7 +177,7 @@ void write_volume(const Solution& solution, const measurement::Measurement& seri
 
 void write_results(const Solution& solution, const measurement::Measurement& series,
                    const BaselineOptions& options, const nlohmann::json& metrics,
-                   const BaselinePaths& paths) {
+                   const output::OutputPaths& paths) {
   write_volume(solution, series, options, paths.volume);
   io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
                               {"options", options_json(options)},
@@ -208,27 +209,23 @@ measurement::Measurement prepare(const tilt_series::TiltSeries& tilt_series,
 
 }  // namespace
 
-BaselinePaths baseline_paths(const std::filesystem::path& volume) {
-  std::filesystem::path stem = volume;
-  stem.replace_extension();
-  return {volume, stem.string() + ".json", stem};
-}
-
 void check_options(const BaselineOptions& options) {
   constexpr const char* kAdvice = "give --overwrite to replace it, or another name with -o";
   base::require_no_faults(option_table::range_faults(options.shared));
   const auto faults = measurement::faults_of_transfer(options.files, options.shared.views);
   base::require_no_faults({faults.begin(), faults.end()});
   io::require_volume_name(options.shared.run.output);
-  const BaselinePaths paths = baseline_paths(options.shared.run.output);
-  io::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
-                         options.shared.run.overwrite, kAdvice);
+  const output::OutputPaths paths = output::output_paths(options.shared.run.output);
+  std::vector<std::filesystem::path> results = paths.pictures();
+  results.insert(results.end(), {paths.volume, paths.json});
+  io::check_output_files(results, io::input_files(options.files), options.shared.run.overwrite,
+                         kAdvice);
   if (options.shared.volume.zarr)
     output::check_zarr(paths.volume, options.shared.run.overwrite, kAdvice);
 }
 
 std::vector<io::OutputLock> claim_outputs(const BaselineOptions& options) {
-  const BaselinePaths paths = baseline_paths(options.shared.run.output);
+  const output::OutputPaths paths = output::output_paths(options.shared.run.output);
   return io::claim_outputs({paths.volume, paths.json}, [&] { check_options(options); });
 }
 
@@ -271,7 +268,7 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
                              const BaselineOptions& requested, const BaselineProgress& progress) {
   base::log_info(base::describe_threads());
   BaselineOptions options = requested;
-  const BaselinePaths paths = baseline_paths(options.shared.run.output);
+  const output::OutputPaths paths = output::output_paths(options.shared.run.output);
   const bool fit_view_scale = fits_view_scale(options);
   measurement::Measurement series =
       prepare(tilt_series, options, io::scratch_directory(paths.volume));

@@ -26,12 +26,6 @@ struct BaselineOptions {
   microscope::CtfCorrection ctf_correction = microscope::CtfCorrection::kFlip;
 };
 
-/// The files of a run, named after its volume.
-struct BaselinePaths {
-  std::filesystem::path volume, json, picture_prefix;
-};
-BaselinePaths baseline_paths(const std::filesystem::path& volume);
-
 /// Checks the options and the output files. Throws Error for options out of range, and if results
 /// would replace existing ones without `overwrite` or cannot be written.
 void check_options(const BaselineOptions& options);

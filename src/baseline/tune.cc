@@ -14,8 +14,8 @@
 #include "base/trace.h"
 #include "baseline/voxel_problem.h"
 #include "tune/scores.h"
-#include "tune/trial_file.h"
 #include "tune/trial_measurement.h"
+#include "tune/trial_record.h"
 
 namespace tomofield::baseline {
 namespace {

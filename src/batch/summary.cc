@@ -143,7 +143,7 @@ std::string mark_of(const Line& line) {
 
 std::vector<report::HtmlCell> page_row(const fs::path& folder, const Line& line) {
   const base::Costs& costs = line.state.costs;
-  const fs::path picture = output::output_paths(line.job->output).xy_picture;
+  const fs::path picture = output::output_paths(line.job->output).slice_pictures[0];
   report::HtmlCell shown{.text = {}, .mark = "picture"};
   if (fs::exists(picture)) shown.picture = fs::absolute(picture).lexically_proximate(folder);
   const bool has_run = costs.wall_seconds > 0;

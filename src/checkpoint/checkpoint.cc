@@ -18,6 +18,7 @@
 #include "options/denoise_factor.h"
 #include "output/shared_options.h"
 #include "tomofield/error.h"
+#include "tune/trial_record.h"
 
 namespace tomofield::checkpoint {
 namespace {

@@ -98,6 +98,14 @@ nlohmann::json metrics_json(const fit::Fit& fit, const measurement::Measurement&
           {"views", views}};
 }
 
+nlohmann::json compact_json(const compact::CompressionReport& report, double seconds) {
+  return {{"parameters", report.parameters},
+          {"bytes", report.bytes},
+          {"rms_change_over_deviation", std::sqrt(report.mean_square_change / report.variance)},
+          {"decibels", report.decibels},
+          {"seconds", seconds}};
+}
+
 // Returns the rows whose slabs this process works on at full resolution.
 std::int64_t rows_worked_on(const fit::Fit& fit) {
   const measurement::RowShare& share = fit.share();

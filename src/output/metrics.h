@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "compact/compress.h"
 #include "fit/fit.h"
 #include "measurement/prepare.h"
 
@@ -16,6 +17,9 @@ nlohmann::json mask_json(const measurement::Measurement& series);
 /// time.
 nlohmann::json metrics_json(const fit::Fit& fit, const measurement::Measurement& series,
                             double seconds);
+
+/// Returns the metrics of a compact model, whose compression took `seconds`.
+nlohmann::json compact_json(const compact::CompressionReport& report, double seconds);
 
 /// Returns as JSON the work and the times of each process in the steps of this run. Every process
 /// calls it.

@@ -36,6 +36,7 @@
 #include "report/denoise_dial.h"
 #include "report/prior_picture.h"
 #include "tomofield/error.h"
+#include "tune/trial_record.h"
 #include "tune/tuning.h"
 
 namespace tomofield::reconstruction {

@@ -34,6 +34,7 @@
 #include "report/choice_plot.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
+#include "tune/trial_record.h"
 #include "verdict/judge.h"
 
 namespace tomofield::reconstruction {
@@ -184,7 +185,7 @@ void make_compact(const compact::Budget& budget, RunResult& results) {
       [&](const compact::CodedField& coded) { return output::coded_file_size(coded, model); });
   results.model->field = std::move(made.field);
   results.model->coded = std::move(made.coded);
-  results.metrics["metrics"]["compact"] = compact::report_json(made.report, running.seconds());
+  results.metrics["metrics"]["compact"] = output::compact_json(made.report, running.seconds());
 }
 
 // Does the same. If that fails, keeps the finished fit.

@@ -84,21 +84,15 @@ std::uint8_t grey_of(double value, double black, double range) {
 
 }  // namespace
 
-std::vector<std::filesystem::path> write_run_pictures(const std::filesystem::path& volume,
-                                                      const tilt_series::TiltSeries& series,
-                                                      tilt_series::BeadMasking bead_masking,
-                                                      const std::filesystem::path& prefix) {
+void write_run_pictures(const std::filesystem::path& volume, const tilt_series::TiltSeries& series,
+                        tilt_series::BeadMasking bead_masking, const output::OutputPaths& paths) {
   const base::TraceSpan span("draw pictures");
-  std::vector<std::filesystem::path> pictures;
-  const std::filesystem::path mask = prefix.string() + "_mask.png";
   base::parallel_for("draw pictures", 2, [&](std::int64_t i) {
     if (i == 0)
-      pictures = write_slice_pictures(volume, prefix);
+      write_slice_pictures(volume, paths.slice_pictures);
     else
-      write_mask_picture(series, bead_masking, mask);
+      write_mask_picture(series, bead_masking, paths.mask_picture);
   });
-  pictures.push_back(mask);
-  return pictures;
 }
 
 void write_mask_picture(const tilt_series::TiltSeries& series,

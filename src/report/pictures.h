@@ -6,6 +6,7 @@
 #include "evaluate/resolution/fsc.h"
 #include "measurement/held_out.h"
 #include "output/model_file.h"
+#include "output/output_paths.h"
 #include "report/curve_plot.h"
 #include "tilt_series/tilt_series.h"
 
@@ -19,12 +20,9 @@ void write_mask_picture(const tilt_series::TiltSeries& series,
                         tilt_series::BeadMasking bead_masking, const std::filesystem::path& path);
 
 /// Draws the central slices of a volume (slice.h) and the masks of its series
-/// (write_mask_picture()), under names that begin with `prefix`. Returns their paths; that of the
-/// masks is the last one.
-std::vector<std::filesystem::path> write_run_pictures(const std::filesystem::path& volume,
-                                                      const tilt_series::TiltSeries& series,
-                                                      tilt_series::BeadMasking bead_masking,
-                                                      const std::filesystem::path& prefix);
+/// (write_mask_picture()): OutputPaths::pictures().
+void write_run_pictures(const std::filesystem::path& volume, const tilt_series::TiltSeries& series,
+                        tilt_series::BeadMasking bead_masking, const output::OutputPaths& paths);
 
 /// Draws the leaves of a model: the central XY slice of its region of interest in grey (x to the
 /// right, y upwards; greys as in write_slice_pictures(), densities as the model holds them), with

@@ -12,7 +12,7 @@
 #include "report/choice_plot.h"
 #include "report/curve_plot.h"
 #include "report/pictures.h"
-#include "tune/trial_settings.h"
+#include "tune/trial_record.h"
 
 namespace tomofield::report {
 namespace {

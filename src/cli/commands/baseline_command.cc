@@ -23,6 +23,7 @@
 #include "cli/terminal/progress_bar.h"
 #include "distributed/communicator.h"
 #include "io/saving/output_set.h"
+#include "output/output_paths.h"
 #include "output/shared_options.h"
 #include "report/pictures.h"
 
@@ -86,18 +87,18 @@ void rehearse(const baseline::BaselineOptions& options, const baseline::MethodFa
 
 // Runs a baseline whose options have been checked.
 void run_method(const baseline::BaselineOptions& options, const baseline::MethodFacts& method,
-                const baseline::BaselinePaths& paths) {
+                const output::OutputPaths& paths) {
   const tilt_series::TiltSeries series(output::series_options(options.files, options.shared));
   print_plan(baseline::plan_baseline(series, options), options, method);
   io::OutputSet results;
   const baseline::BaselineSummary summary = baseline::run_baseline(
       series, options, {make_progress_bar("tune"), make_progress_bar("baseline")});
-  const auto pictures = report::write_run_pictures(results.location_of(paths.volume), series,
-                                                   summary.bead_masking, paths.picture_prefix);
+  report::write_run_pictures(results.location_of(paths.volume), series, summary.bead_masking,
+                             paths);
   results.commit();
   print_summary(summary);
   print("tomogram  {}\nmetrics   {}\n", paths.volume.string(), paths.json.string());
-  print_pictures(pictures);
+  print_pictures(paths.pictures());
 }
 
 template <typename Method>
@@ -109,7 +110,7 @@ void run(BaselineArguments<Method>& arguments, const Origins& origins) {
     method.non_negative = arguments.non_negative.value_or(shared.views.contrast != Contrast::kDark);
   const baseline::BaselineOptions options{arguments.choices.files, shared, method,
                                           arguments.ctf_correction};
-  const baseline::BaselinePaths paths = baseline::baseline_paths(shared.run.output);
+  const output::OutputPaths paths = output::output_paths(shared.run.output);
   const auto check_trace = [&] {
     check_trace_file(arguments.trace, {paths.volume, paths.json}, options.files,
                      shared.run.overwrite);
