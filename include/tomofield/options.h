@@ -37,12 +37,16 @@ enum class VolumeAxes { kXyz, kXzy };
 /// Type of a voxel in a volume file: MRC modes 2, 12 and 1 (scaled).
 enum class VoxelType { kFloat32, kFloat16, kInt16 };
 
+/// Version of OME-Zarr: 0.4 is a Zarr group of version 2, 0.5 one of version 3.
+enum class ZarrVersion { k04, k05 };
+
 /// The files that a tilt series is read from.
 struct SeriesFiles {
   std::filesystem::path stack;                 ///< MRC or TIFF stack, raw or aligned
   std::optional<std::filesystem::path> tlt;    ///< .tlt or .rawtlt: an angle in degrees a section
   std::optional<std::filesystem::path> xf;     ///< IMOD raw-to-aligned transforms
   std::optional<std::filesystem::path> xtilt;  ///< IMOD x-axis tilt, degrees a section
+  std::optional<std::filesystem::path> local;  ///< IMOD's local alignments
   std::optional<std::filesystem::path> aln;    ///< AreTomo alignment (angles, rotation, shifts)
   std::optional<std::filesystem::path> mdoc;   ///< SerialEM metadata (angles, pixel size)
   std::optional<std::filesystem::path> mask;   ///< MRC as the stack: 0 is no measurement
@@ -175,6 +179,7 @@ struct VolumeOptions {
   VolumeAxes axes = VolumeAxes::kXyz;
   bool invert = false;  ///< write the other contrast than the input's
   bool zarr = false;    ///< write the volume as OME-Zarr as well
+  ZarrVersion zarr_version = ZarrVersion::k04;
 };
 
 /// The run: the alignment before the fit (docs/alignment.md), and its files.

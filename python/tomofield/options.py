@@ -19,6 +19,7 @@ class Options(TypedDict, total=False):
     tlt: Optional[_Path]
     xf: Optional[_Path]
     xtilt: Optional[_Path]
+    local: Optional[_Path]
     aln: Optional[_Path]
     mdoc: Optional[_Path]
     tilt_offset_deg: float
@@ -91,6 +92,7 @@ class Options(TypedDict, total=False):
     axes: Literal["xyz", "xzy"]
     invert: bool
     zarr: bool
+    zarr_version: Literal["0.4", "0.5"]
 
     # Halves
     even: Optional[_Path]

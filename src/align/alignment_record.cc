@@ -66,10 +66,10 @@ json local_json(const LocalRecord& local) {
 }
 
 json pose_json(const FoundPose& found) {
-  return {{"pitch_deg", found.pose.pitch_deg},
-          {"pitch_error_deg", found.error.pitch_deg},
-          {"thickness_px", found.pose.thickness_px},
-          {"thickness_error_px", found.error.thickness_px}};
+  return {
+      {"pitch_deg", found.pose.pitch_deg},       {"pitch_error_deg", found.error.pitch_deg},
+      {"x_tilt_deg", found.pose.x_tilt_deg},     {"x_tilt_error_deg", found.error.x_tilt_deg},
+      {"thickness_px", found.pose.thickness_px}, {"thickness_error_px", found.error.thickness_px}};
 }
 
 json beads_json(const BeadRecord& beads) {
@@ -178,9 +178,11 @@ LocalRecord local_from(const json& object) {
 FoundPose pose_from(const json& object) {
   FoundPose found;
   found.pose = {.thickness_px = number_at(object, "thickness_px"),
-                .pitch_deg = number_at(object, "pitch_deg")};
+                .pitch_deg = number_at(object, "pitch_deg"),
+                .x_tilt_deg = number_at(object, "x_tilt_deg")};
   found.error = {.thickness_px = number_at(object, "thickness_error_px"),
-                 .pitch_deg = number_at(object, "pitch_error_deg")};
+                 .pitch_deg = number_at(object, "pitch_error_deg"),
+                 .x_tilt_deg = number_at(object, "x_tilt_error_deg")};
   return found;
 }
 

@@ -174,6 +174,7 @@ class AligningFit {
     const base::TraceSpan span("find pose");
     found_.pose = search.find({.thickness_px = measurement_.geometry.thickness});
     if (!found_.pose) return;
+    found_.pose->pose.x_tilt_deg += problem_.plan.x_tilt_deg;
     found_.pose->pose.thickness_px *= measurement_.bin_factor;
     found_.pose->error.thickness_px *= measurement_.bin_factor;
   }

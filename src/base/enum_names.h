@@ -72,6 +72,11 @@ struct EnumNames<VolumeAxes> {
                                      std::pair{VolumeAxes::kXzy, "xzy"}};
 };
 template <>
+struct EnumNames<ZarrVersion> {
+  static constexpr std::array kNames{std::pair{ZarrVersion::k04, "0.4"},
+                                     std::pair{ZarrVersion::k05, "0.5"}};
+};
+template <>
 struct EnumNames<VoxelType> {
   static constexpr std::array kNames{std::pair{VoxelType::kFloat32, "2"},
                                      std::pair{VoxelType::kFloat16, "12"},

@@ -151,7 +151,7 @@ measurement::Measurement prepare(const tilt_series::TiltSeries& tilt_series,
 }  // namespace
 
 tilt_series::TiltSeriesOptions BaselineOptions::input() const {
-  tilt_series::TiltSeriesOptions input = output::series_options(files, shared);
+  tilt_series::TiltSeriesOptions input = tilt_series::series_options(files, shared);
   input.images = images;
   return input;
 }

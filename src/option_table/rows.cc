@@ -43,6 +43,8 @@ constexpr Row kRows[] = {
     {.key = "input.xtilt", .flag = "--xtilt", MEMBER(files, xtilt),
      .group = Group::kAlignment,
      .help = "IMOD's x-axis tilts (.xtilt): a line with degrees for every section"},
+    {.key = "input.local", .flag = "--local", MEMBER(files, local), .group = Group::kAlignment,
+     .help = "IMOD's local alignments of an aligned stack or of --xf (LOCALFILE of tilt.com)"},
     {.key = "input.aln", .flag = "--aln", MEMBER(files, aln), .group = Group::kAlignment,
      .help = "AreTomo's alignment of the raw stack (.aln): angles, rotation, shifts",
      .is_common = true},
@@ -266,8 +268,12 @@ constexpr Row kRows[] = {
      .group = Group::kVolume, .help = "Write the volume with the contrast of the input inverted",
      .is_common = true},
     {.key = "running.zarr", .flag = "--zarr", MEMBER(options.volume, zarr), .group = Group::kVolume,
-     .help = "Also write the volume as OME-Zarr 0.4 with a 2x pyramid, in a folder NAME.zarr",
+     .help = "Also write the volume as OME-Zarr with a 2x pyramid, in a folder NAME.zarr",
      .is_common = true},
+    {.key = "running.zarr_version", .flag = "--zarr-version", MEMBER(options.volume, zarr_version),
+     .group = Group::kVolume,
+     .help = "Version of OME-Zarr. 0.4: Zarr v2, which all readers know; 0.5: Zarr v3, as the CryoET "
+             "Data Portal and copick have it"},
 
     // Halves
     {.key = "input.even", .flag = "--even", MEMBER(files, even), .group = Group::kHalves,

@@ -70,12 +70,12 @@ template <typename T>
 using Reference = T& (*)(Choices&);
 template <typename... T>
 using References = std::variant<Reference<T>...>;
-using Member =
-    References<std::filesystem::path, std::optional<std::filesystem::path>, bool, int, std::int64_t,
-               std::uint64_t, double, std::string, std::optional<int>, std::optional<double>,
-               std::optional<Rectangle>, Contrast, Alignment, TreeKind, Engine, RingReference,
-               NoiseModel, VoxelType, VolumeAxes, Choice<bool>, Choice<int>, Choice<double>,
-               Choice<FieldKind>, Choice<Activation>, Choice<Penalty>, Choice<Prior>>;
+using Member = References<std::filesystem::path, std::optional<std::filesystem::path>, bool, int,
+                          std::int64_t, std::uint64_t, double, std::string, std::optional<int>,
+                          std::optional<double>, std::optional<Rectangle>, Contrast, Alignment,
+                          TreeKind, Engine, RingReference, NoiseModel, VoxelType, VolumeAxes,
+                          ZarrVersion, Choice<bool>, Choice<int>, Choice<double>, Choice<FieldKind>,
+                          Choice<Activation>, Choice<Penalty>, Choice<Prior>>;
 
 /// Describes one option: the command line, the configuration file, the checks, the JSON, the
 /// fingerprint of a checkpoint and docs/options.md all read this row.

@@ -22,8 +22,8 @@ template <typename Struct, typename Note>
 void note_members(const Struct& of, const Note& note) {
   const auto note_all = [&](const auto&... member) { (note(&member), ...); };
   if constexpr (std::is_same_v<Struct, SeriesFiles>) {
-    const auto& [m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11] = of;
-    note_all(m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11);
+    const auto& [m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12] = of;
+    note_all(m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12);
   } else if constexpr (std::is_same_v<Struct, ViewOptions>) {
     const auto& [m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17,
                  m18, m19, m20, m21] = of;
@@ -41,8 +41,8 @@ void note_members(const Struct& of, const Note& note) {
     note_all(m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17, m18,
              m19, m20, m21, m22, m23, m24, m25, m26);
   } else if constexpr (std::is_same_v<Struct, VolumeOptions>) {
-    const auto& [m0, m1, m2, m3] = of;
-    note_all(m0, m1, m2, m3);
+    const auto& [m0, m1, m2, m3, m4] = of;
+    note_all(m0, m1, m2, m3, m4);
   } else {
     static_assert(std::is_same_v<Struct, RunOptions>);
     const auto& [m0, m1, m2, m3, m4, m5] = of;

@@ -4,19 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <mutex>
-#include <numbers>
 #include <span>
 #include <vector>
 
-#include "base/log.h"
 #include "base/trace.h"
 #include "distributed/gathered_arrays.h"
 #include "io/images/ome_zarr.h"
 #include "io/saving/atomic_folder.h"
 #include "io/saving/output_set.h"
+#include "output/box_bounds.h"
 #include "output/sample_model.h"
 #include "output/volume_labels.h"
 #include "tomofield/error.h"
@@ -44,55 +42,15 @@ void gather_parameters(const VolumeShare& share, field::Field& field) {
   });
 }
 
-// The smallest upright box around a box, which may be turned.
-struct Bounds {
-  Point low, high;
-  explicit Bounds(const OrientedBox& box) {
-    low.fill(std::numeric_limits<double>::infinity());
-    high.fill(-std::numeric_limits<double>::infinity());
-    for (int corner = 0; corner < 8; ++corner) {
-      Point voxel{};
-      for (std::size_t a = 0; a < 3; ++a)
-        voxel[a] = (corner >> a & 1) ? static_cast<double>(box.size[a]) : 0.0;
-      const Point at = box.position(voxel);
-      for (std::size_t a = 0; a < 3; ++a) {
-        low[a] = std::min(low[a], at[a]);
-        high[a] = std::max(high[a], at[a]);
-      }
-    }
-  }
-};
-
 // Refuses a box that does not meet the field, because all its voxels would be zero.
-void require_inside(const Model& model, const Bounds& box) {
-  const field::RootGrid& roots = model.tree().roots();
-  const Point first{static_cast<double>(roots.x0), static_cast<double>(roots.y0), 0.0};
-  const Point last{first[0] + static_cast<double>(roots.columns * roots.cell_size),
-                   first[1] + static_cast<double>(roots.rows * roots.cell_size), model.thickness()};
-  for (std::size_t a = 0; a < 3; ++a) {
-    if (box.low[a] < last[a] && box.high[a] > first[a]) continue;
-    throw Error(
-        fmt::format("the box lies outside of the model: its {} runs from {:.6g} to {:.6g} px, the "
-                    "model's from {:.6g} to {:.6g}",
-                    "xyz"[a], box.low[a], box.high[a], first[a], last[a]));
-  }
-}
-
-// Warns of a box beyond the region of interest: there the field is a margin, which only some views
-// see.
-void warn_of_margin(const ModelInfo& info, const Bounds& box, double tolerance) {
-  const Rectangle& roi = info.roi;
-  const Point first{static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0};
-  const Point last{static_cast<double>(roi.x1), static_cast<double>(roi.y1),
-                   info.geometry.thickness};
-  for (std::size_t a = 0; a < 3; ++a) {
-    if (box.low[a] >= first[a] - tolerance && box.high[a] <= last[a] + tolerance) continue;
-    base::log_warning(fmt::format(
-        "the box reaches outside the region that was reconstructed: its {} runs from {:.6g} to "
-        "{:.6g} px, the region's from {:.6g} to {:.6g}; what lies there is a guess or nothing",
-        "xyz"[a], box.low[a], box.high[a], first[a], last[a]));
-    return;
-  }
+void require_inside(const Model& model, const BoxBounds& box) {
+  const BoxBounds field = field_bounds(model);
+  const auto axis = box.axis_apart(field);
+  if (!axis) return;
+  throw Error(fmt::format(
+      "the box lies outside of the model: its {} runs from {:.6g} to {:.6g} px, the "
+      "model's from {:.6g} to {:.6g}",
+      "xyz"[*axis], box.low[*axis], box.high[*axis], field.low[*axis], field.high[*axis]));
 }
 
 // Returns the corner of the box from the view's corner in Å (docs/geometry.md).
@@ -107,18 +65,6 @@ std::array<double, 3> origin_A(const ModelInfo& info, const OrientedBox& box, Vo
   }
   for (double& value : corner) value *= info.pixel_size_A;
   return corner;
-}
-
-io::MrcMode mrc_mode(VoxelType type) {
-  switch (type) {
-    case VoxelType::kFloat32:
-      return io::MrcMode::kFloat32;
-    case VoxelType::kFloat16:
-      return io::MrcMode::kFloat16;
-    case VoxelType::kInt16:
-      return io::MrcMode::kInt16;
-  }
-  return io::MrcMode::kFloat32;
 }
 
 float largest_density(const VoxelSource& source, const distributed::Communicator& processes) {
@@ -169,32 +115,38 @@ class PartWriter {
   float scale_;
 };
 
-// Turns a box of the specimen into the frame of the field. The fit sees the specimen after its
-// x-axis tilt, p = Ry(tilt) Rx(alpha) (P − C) (docs/geometry.md), so the box is turned by Rx(alpha)
-// about C. A mirrored Z turns the other way.
-void rotate_about_x(const ModelInfo& model, OrientedBox& box) {
-  const geometry::TiltGeometry& g = model.geometry;
-  const double alpha = g.hand * model.x_tilt_deg * std::numbers::pi / 180.0;
-  const double c = std::cos(alpha), s = std::sin(alpha);
-  box.field_from_box = {{{1, 0, 0}, {0, c, -s}, {0, s, c}}};
-  const double axis_y = static_cast<double>(g.height) / 2;
-  const double y = box.centre_px[1] - axis_y, z = box.centre_px[2] - g.axis_z;
-  box.centre_px[1] = axis_y + c * y - s * z;
-  box.centre_px[2] = g.axis_z + s * y + c * z;
+}  // namespace
+
+io::MrcMode mrc_mode(VoxelType type) {
+  switch (type) {
+    case VoxelType::kFloat32:
+      return io::MrcMode::kFloat32;
+    case VoxelType::kFloat16:
+      return io::MrcMode::kFloat16;
+    case VoxelType::kInt16:
+      return io::MrcMode::kInt16;
+  }
+  return io::MrcMode::kFloat32;
 }
 
-}  // namespace
+double int16_factor(double largest_value, std::string& label) {
+  constexpr double kLargestStored = 32000.0;
+  const double largest = std::abs(largest_value);
+  const double factor = largest > 0 ? kLargestStored / largest : 1.0;
+  label += fmt::format(", stored = {:.6g} x value", factor);
+  return factor;
+}
 
 std::filesystem::path zarr_path(const std::filesystem::path& volume) {
   std::filesystem::path path = volume;
   return path.replace_extension(".zarr");
 }
 
-void write_zarr(const std::filesystem::path& volume) {
+void write_zarr(const std::filesystem::path& volume, ZarrVersion version) {
   const base::TraceSpan span("write OME-Zarr");
   const io::OutputSet* const results = io::OutputSet::active();
   io::write_ome_zarr(results != nullptr ? results->location_of(volume) : volume, zarr_path(volume),
-                     volume.stem().string());
+                     volume.stem().string(), version);
 }
 
 void check_zarr(const std::filesystem::path& volume, bool may_replace, const std::string& advice) {
@@ -204,14 +156,13 @@ void check_zarr(const std::filesystem::path& volume, bool may_replace, const std
     throw Error(fmt::format("'{}' exists: {}", zarr.string(), advice));
 }
 
-OrientedBox region_box(const ModelInfo& model, double voxel_px) {
+OrientedBox region_box(const ModelInfo& model, double voxel_px, const Levelling& levelling) {
   const auto& roi = model.roi;
-  OrientedBox box = field::box_between(
-      {static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0},
-      {static_cast<double>(roi.x1), static_cast<double>(roi.y1), model.geometry.thickness},
-      voxel_px);
-  if (model.x_tilt_deg != 0.0) rotate_about_x(model, box);
-  return box;
+  return VolumeFrame(model, levelling)
+      .to_field(field::box_between(
+          {static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0},
+          {static_cast<double>(roi.x1), static_cast<double>(roi.y1), model.geometry.thickness},
+          voxel_px));
 }
 
 float largest_density(const Model& model) {
@@ -224,9 +175,7 @@ void write_volume(const Model& model, const VolumeOptions& options,
                   const std::filesystem::path& path, const VolumePart& part) {
   const OrientedBox box = part.box.value_or(region_box(model, 1.0));
   field::require_feasible(box);
-  const Bounds bounds(box);
-  require_inside(model, bounds);
-  if (part.box) warn_of_margin(model, bounds, 0.5 * box.voxel_px);
+  require_inside(model, BoxBounds(box));
   write_voxels([&](const field::BoxSink& sink) { sample_box(model, box, sink); }, box, model,
                kMadeBy, options, path, distributed::Communicator::alone(), part.largest_density);
 }
@@ -265,12 +214,9 @@ void write_voxels(const VoxelSource& source, const OrientedBox& box, const Model
   double scale = options.invert ? -info.output_scale() : info.output_scale();
   if (options.voxel_type == VoxelType::kInt16) {
     { const io::MrcWriter probe(path, spec, processes); }  // refuses before the pass, not after it
-    constexpr double kLargestStored = 32000.0;
-    const double stored =
-        std::abs(scale) *
-        static_cast<double>(largest ? *largest : largest_density(source, processes));
-    const double factor = stored > 0 ? kLargestStored / stored : 1.0;
-    spec.labels.front() += fmt::format(", stored = {:.6g} x value", factor);
+    const double factor = int16_factor(
+        scale * static_cast<double>(largest ? *largest : largest_density(source, processes)),
+        spec.labels.front());
     scale *= factor;
   }
   io::MrcWriter file(path, spec, processes);
@@ -278,7 +224,7 @@ void write_voxels(const VoxelSource& source, const OrientedBox& box, const Model
   file.close();
   if (!options.zarr) return;
   processes.run_collectively([&] {
-    if (processes.is_root()) write_zarr(path);
+    if (processes.is_root()) write_zarr(path, options.zarr_version);
   });
 }
 

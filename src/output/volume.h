@@ -11,6 +11,7 @@
 #include "field/sampling/sample_box.h"
 #include "io/images/mrc.h"
 #include "output/model_file.h"
+#include "output/volume_frame.h"
 #include "tomofield/options.h"
 
 namespace tomofield::output {
@@ -23,6 +24,13 @@ struct VolumePart {
   std::optional<float> largest_density = {};
 };
 
+/// Returns the mode in which voxels of a type are stored.
+io::MrcMode mrc_mode(VoxelType type);
+
+/// Returns by what values are multiplied for kInt16, of which `largest_value` becomes ±32000, and
+/// adds that to the label of the header.
+double int16_factor(double largest_value, std::string& label);
+
 /// Returns the folder of a volume's copy as OME-Zarr: NAME.zarr beside NAME.mrc.
 std::filesystem::path zarr_path(const std::filesystem::path& volume);
 
@@ -31,13 +39,15 @@ std::filesystem::path zarr_path(const std::filesystem::path& volume);
 void check_zarr(const std::filesystem::path& volume, bool may_replace, const std::string& advice);
 
 /// Writes this copy of a volume, which may wait in an io::OutputSet.
-void write_zarr(const std::filesystem::path& volume);
+void write_zarr(const std::filesystem::path& volume, ZarrVersion version);
 
 /// Returns the largest absolute density in the region of interest of a model.
 float largest_density(const Model& model);
 
-/// Returns the region of interest and the whole thickness, in whole voxels of `voxel_px` pixels.
-field::OrientedBox region_box(const ModelInfo& model, double voxel_px);
+/// Returns the region of interest and the whole thickness, in whole voxels of `voxel_px` pixels,
+/// where it lies in the field: turned back by the x-axis tilt and brought level.
+field::OrientedBox region_box(const ModelInfo& model, double voxel_px,
+                              const Levelling& levelling = {});
 
 /// Writes a box of a model as an MRC volume, in the input's units and contrast (dark input: dense
 /// is low, an empty region is 0). The header has the exact voxel size and, as

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -68,7 +69,6 @@ struct Refusal {
   std::string_view entry, why;
 };
 constexpr Refusal kRefusals[] = {
-    {"ZFACTORFILE", "corrects the views by height, which this program cannot do"},
     {"ANGLES", "lists the tilt angles in the command file: put them into a .tlt file (--tlt)"},
     {"COMPRESS", "compresses the specimen view by view, which this program cannot do"},
     {"REPLICATE", "repeats views at other angles, which this program cannot do"},
@@ -103,8 +103,23 @@ void warn_of_what_differs(Project& project, CommandEntries& tilt) {
   }
 }
 
+// Says what the factors of ZFACTORFILE do: each view is shifted in proportion to the height in the
+// specimen.
+std::string effect_of_z_factors(CommandEntries& tilt) {
+  const fs::path path = tilt.path("ZFACTORFILE").value_or(fs::path());
+  std::string effect = "shifts the views in proportion to the height, which this program cannot do";
+  const auto thickness = tilt.number("THICKNESS");
+  if (!thickness || !io::is_file(path)) return effect;
+  double largest = 0.0;
+  for (const io::TextLine& line : io::read_text_lines(path))
+    for (const std::string_view word : io::split_words(line.text))
+      largest = std::max(largest, std::abs(io::parse_number(word).value_or(0.0)));
+  return fmt::format("{}: by up to {:.2g} pixels at the faces of the specimen", effect,
+                     largest * *thickness / 2);
+}
+
 // Refuses all entries at once without which the reconstruction is another one.
-void refuse_what_is_missing(Project& project, CommandEntries& tilt, CommandEntries* newst) {
+void refuse_what_is_missing(Project& project, CommandEntries& tilt) {
   std::vector<std::string> faults;
   std::vector<std::string_view> entries;
   const auto refuse = [&](std::string_view entry, std::string_view why) {
@@ -114,15 +129,10 @@ void refuse_what_is_missing(Project& project, CommandEntries& tilt, CommandEntri
     entries.push_back(entry);
   };
   for (const Refusal& refusal : kRefusals) refuse(refusal.entry, refusal.why);
-  const auto local = tilt.text("LOCALFILE");
-  const auto global = newst == nullptr ? std::nullopt : newst->text("TransformFile");
-  if (local && local == global) {
-    project.warn(
-        fmt::format("'{}': LOCALFILE names the transforms of the whole views, as AreTomo "
-                    "writes it; they are applied once",
-                    tilt.file().string()));
-  } else {
-    refuse("LOCALFILE", "aligns parts of the views by themselves, which this program cannot do");
+  if (tilt.has("ZFACTORFILE")) refuse("ZFACTORFILE", effect_of_z_factors(tilt));
+  if (const auto local = tilt.path("LOCALFILE"); local && !io::is_file(*local)) {
+    refuse("LOCALFILE",
+           fmt::format("names the local alignments '{}', which are not there", local->string()));
   }
   if (const auto xtilt = tilt.path("XTILTFILE"); xtilt && !io::is_file(*xtilt)) {
     refuse("XTILTFILE",
@@ -134,6 +144,21 @@ void refuse_what_is_missing(Project& project, CommandEntries& tilt, CommandEntri
                             faults.size() == 1 ? "it" : "them"));
   }
   warn_of_what_differs(project, tilt);
+}
+
+// Sets the local alignments, unless they are the transforms of the whole views, which AreTomo
+// writes there.
+void set_local(Project& project, CommandEntries& tilt, CommandEntries* newst) {
+  const auto local = tilt.text("LOCALFILE");
+  if (!local || !io::is_file(*tilt.path("LOCALFILE"))) return;
+  if (newst != nullptr && newst->text("TransformFile") == local) {
+    project.warn(
+        fmt::format("'{}': LOCALFILE names the transforms of the whole views, as AreTomo "
+                    "writes it; they are applied once",
+                    tilt.file().string()));
+    return;
+  }
+  project.set("--local", tilt.path("LOCALFILE")->string(), tilt.file(), "LOCALFILE");
 }
 
 void set_angles(Project& project, CommandEntries& tilt) {
@@ -202,9 +227,10 @@ void read_imod_project(Project& project, const fs::path& tilt_com) {
   std::optional<CommandEntries> newst_com;
   if (const auto path = find_newst(tilt.file())) newst_com.emplace(project, *path, "newstack");
   CommandEntries* newst = newst_com ? &*newst_com : nullptr;
-  refuse_what_is_missing(project, tilt, newst);
+  refuse_what_is_missing(project, tilt);
   const ImodImages images = choose_imod_images(project, tilt, newst);
   set_angles(project, tilt);
+  set_local(project, tilt, newst);
   set_imod_volume(project, tilt, images);
   set_excluded(project, tilt, images.num_sections);
   set_intensities(project, tilt);

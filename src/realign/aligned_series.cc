@@ -60,10 +60,11 @@ void log_beads(const alignment::BeadRecord& beads) {
 void log_pose(const alignment::FoundPose& found) {
   base::log_info(fmt::format(
       "the specimen seems to be {:.0f} ± {:.0f} pixels thick and to have a pitch of "
-      "{:.1f} ± {:.1f}° against the tilt angles; noisy views give rough values, so look "
-      "at the XZ plane before you apply them (--thickness, --tilt-offset)",
+      "{:.1f} ± {:.1f}° against the tilt angles, and of {:.1f} ± {:.1f}° about X; noisy views give "
+      "rough values, so look at the XZ plane before you apply them (--thickness; export --level "
+      "found)",
       found.pose.thickness_px, found.error.thickness_px, found.pose.pitch_deg,
-      found.error.pitch_deg));
+      found.error.pitch_deg, found.pose.x_tilt_deg, found.error.x_tilt_deg));
 }
 
 void log_alignment(const alignment::AlignmentRecord& record) {

@@ -41,6 +41,7 @@ std::vector<std::pair<const char*, std::filesystem::path>> small_files(const Ser
   add("tlt", files.tlt);
   add("xf", files.xf);
   add("xtilt", files.xtilt);
+  add("local", files.local);
   add("aln", files.aln);
   add("mdoc", files.mdoc);
   add("fiducials", files.fiducials);

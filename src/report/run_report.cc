@@ -105,12 +105,14 @@ void add_pose(const alignment::AlignmentRecord& alignment, std::vector<HtmlFact>
   const auto& [pose, error] = *alignment.pose;
   facts.push_back(
       {"Thickness and pitch",
-       fmt::format("{:.0f} ± {:.0f} px, {:.1f} ± {:.1f}°", pose.thickness_px, error.thickness_px,
-                   pose.pitch_deg, error.pitch_deg),
-       "What the specimen seems to have, in unbinned pixels, and in degrees against the tilt "
-       "angles. "
+       fmt::format("{:.0f} ± {:.0f} px, {:.1f} ± {:.1f}°, {:.1f} ± {:.1f}°", pose.thickness_px,
+                   error.thickness_px, pose.pitch_deg, error.pitch_deg, pose.x_tilt_deg,
+                   error.x_tilt_deg),
+       "What the specimen seems to have: its thickness in unbinned pixels, and its angles in "
+       "degrees "
+       "against the tilt angles and about X. "
        "Noisy views give rough values, whatever their errors say: look at the XZ plane first. The "
-       "alignment applied neither; --thickness and --tilt-offset do that."});
+       "alignment applied none of them; --thickness and tomofield export --level found do that."});
 }
 
 void add_prior(const verdict::PriorSummary& prior, std::vector<HtmlFact>& facts) {

@@ -115,9 +115,9 @@ TEST_F(RunReport, ShowsHowFarGoldBeadsLieFromTheirPlacesAndThePose) {
                             .shift_px = {1.0, 2.0},
                             .agreement = {.correlation = 0.9, .error_px = {0.1, 0.1}}});
   EXPECT_FALSE(page_has("Thickness and pitch"));
-  found->pose = {.pose = {.thickness_px = 190.2, .pitch_deg = -4.7},
-                 .error = {.thickness_px = 18.0, .pitch_deg = 0.8}};
-  EXPECT_TRUE(page_has("190 ± 18 px, -4.7 ± 0.8°"));
+  found->pose = {.pose = {.thickness_px = 190.2, .pitch_deg = -4.7, .x_tilt_deg = 1.5},
+                 .error = {.thickness_px = 18.0, .pitch_deg = 0.8, .x_tilt_deg = 0.6}};
+  EXPECT_TRUE(page_has("190 ± 18 px, -4.7 ± 0.8°, 1.5 ± 0.6°"));
   EXPECT_TRUE(page_has("0.25 px"));
   EXPECT_TRUE(page_has("of the files: 1.25 px"));
   found->is_accepted = false;

@@ -77,15 +77,13 @@ SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::Im
   require_raw_size(alignment, path, stack);
   const auto sections =
       io::assign_aretomo_sections(alignment, path, stack.header().nz, stack.name());
-  SectionTable table{path.string(), {}};
+  SectionTable table{.source = path.string(), .of_section = {}};
   table.of_section.resize(static_cast<std::size_t>(stack.header().nz));
   for (std::size_t row = 0; row < sections.size(); ++row)
     table.of_section[static_cast<std::size_t>(sections[row])] = section_of(alignment.rows[row]);
-  if (alignment.num_local_rows > 0) {
-    base::log_warning(
-        fmt::format("'{}' has local alignment, which is not applied: views are aligned as a whole",
-                    path.string()));
-  }
+  if (!alignment.patches.empty()) table.patches.resize(table.of_section.size());
+  for (std::size_t row = 0; row < alignment.patches.size(); ++row)
+    table.patches[static_cast<std::size_t>(sections[row])] = alignment.patches[row];
   if (std::ranges::any_of(alignment.rows,
                           [](const io::AreTomoRow& row) { return row.magnification != 1.0; })) {
     base::log_warning(
@@ -99,7 +97,8 @@ SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::Im
 SectionTable sections_of_views(const io::ViewTable& table, const io::ImageStack& stack,
                                double pixel_size_A) {
   require_count(table.views.size(), table.file, "views", stack);
-  SectionTable sections{table.file.string(), {}, table.is_nominal};
+  SectionTable sections{
+      .source = table.file.string(), .of_section = {}, .is_nominal = table.is_nominal};
   for (const io::ListedView& view : table.views) {
     sections.of_section.emplace_back();
     if (view.is_used)

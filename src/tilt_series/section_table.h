@@ -8,6 +8,7 @@
 
 #include "geometry/raw_from_aligned.h"
 #include "io/images/image_stack.h"
+#include "io/tables/alignment_files.h"
 #include "io/tables/view_table.h"
 
 namespace tomofield::tilt_series {
@@ -26,6 +27,8 @@ struct AlignedSection {
 struct SectionTable {
   std::string source;                                     ///< the name of the file
   std::vector<std::optional<AlignedSection>> of_section;  ///< none: left out by that program
+  /// [section]: what AreTomo moves by itself; empty without a local alignment.
+  std::vector<std::vector<io::AreTomoPatch>> patches = {};
   bool is_nominal = false;  ///< the angles are those of the microscope, and nothing is aligned yet
 };
 

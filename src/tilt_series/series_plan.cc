@@ -16,6 +16,7 @@
 #include "io/tables/alignment_files.h"
 #include "io/tables/view_table.h"
 #include "tilt_series/contradictions.h"
+#include "tilt_series/local/file_motion.h"
 #include "tilt_series/resampling/binning.h"
 #include "tilt_series/section_table.h"
 #include "tilt_series/tilt_angles.h"
@@ -235,6 +236,12 @@ void require_compatible(const TiltSeriesOptions& options) {
         "give one of them",
         options.xf ? "--xf" : "--aln", (options.xf ? *options.xf : *options.aln).string()));
   }
+  if (options.local && options.aln) {
+    throw Error(fmt::format(
+        "'{}' (--local) has IMOD's local alignments, and '{}' (--aln) is of AreTomo; give one of "
+        "them",
+        options.local->string(), options.aln->string()));
+  }
   if (options.black_level.value_or(0) != 0 && options.contrast == Contrast::kDark)
     throw Error("--black-level is for --contrast bright: leave it out");
   if (options.log_base != 0 && !options.take_log)
@@ -268,7 +275,10 @@ std::vector<std::int64_t> used_sections(const TiltSeriesOptions& options, std::i
 void correct(const geometry::ViewCorrection& correction, PlannedView& planned) {
   planned.raw_from_aligned = geometry::corrected(planned.raw_from_aligned, correction);
   planned.view.tilt_deg += correction.tilt_deg;
-  planned.local = correction.local;
+  if (planned.local && correction.local)
+    planned.local = planned.local->then(*correction.local);
+  else if (correction.local)
+    planned.local = correction.local;
 }
 
 }  // namespace
@@ -277,6 +287,7 @@ TiltSeriesOptions series_options(const SeriesFiles& files, const Options& option
   TiltSeriesOptions series{files, options.views};
   series.resample = options.fit.engine == Engine::kSlab;
   series.starts_raw = options.run.align == Alignment::kFull;
+  series.applies_local = series.resample && options.run.align == Alignment::kOff;
   series.scratch_dir = io::scratch_directory(options.run.output);
   return series;
 }
@@ -331,16 +342,19 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
   for (auto& tilt : tilts.of_section)
     if (tilt) tilt->value += options.tilt_offset_deg;
   require_usable_tilts(tilts, sections);
+  FileMotion motion(options, stack, table, plan.pixel_size_A, size);
   for (const std::int64_t section : sections) {
     const auto at = static_cast<std::size_t>(section);
     PlannedView planned;
     planned.view = {section, tilts.of_section[at]->value,
                     x_tilts_deg[at] - options.x_axis_tilt_deg};
     if (alignment) planned.raw_from_aligned = *alignment->of_section[at];
+    planned.local = motion.of(planned.view);
     if (!options.corrections.empty()) correct(options.corrections[at], planned);
     TOMOFIELD_CHECK(options.resample || !planned.local, "local motion of views as recorded");
     plan.views.push_back(planned);
   }
+  if (options.corrections.empty() && options.left_out.empty()) motion.report();
   return plan;
 }
 

@@ -22,6 +22,8 @@ struct TiltSeriesOptions : SeriesFiles, ViewOptions {
   /// The views will be aligned from the direction of their tilt axis on, as files state it. Else a
   /// stack whose stated axis is not vertical needs an alignment.
   bool starts_raw = false;
+  /// False: local alignments of files are left out, as for views that will be aligned.
+  bool applies_local = true;
   /// Takes decoded views that do not fit in memory; empty: the system's folder for such files.
   std::filesystem::path scratch_dir = {};
   /// [section]: changes of the alignment that the files give. Empty: none. Local motion

@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -38,6 +39,18 @@ def pattern(data):
     return [os.path.join(data, "?.mrc"), "--tlt", "{folder}/{name}.tlt"]
 
 
+# The batch gives these to each series itself.
+OWN = {"stack", "--output", "--overwrite", "--resume"}
+
+
+def options_of_reconstruct():
+    """Returns the flag of every row of the option table, with its kind of value, as
+    docs/options.md lists them."""
+    page = pathlib.Path(__file__).resolve().parents[2] / "docs/options.md"
+    rows = re.findall(r"^\| `([^`]*)` \| (.*?) \|", page.read_text("utf-8"), re.MULTILINE)
+    return {flags.split(",")[-1].strip(): value for flags, value in rows}
+
+
 def summary(folder):
     """Returns the lines of summary.csv by the names of their series."""
     with open(os.path.join(folder, "summary.csv"), encoding="utf-8", newline="") as file:
@@ -66,6 +79,60 @@ def run_first(data):
     folder = harness.fresh_directory("first")
     result = harness.tomofield("batch", *pattern(data), *QUICK, "-o", folder)
     return folder, result
+
+
+def test_a_batch_and_its_tables_know_every_option_of_reconstruct(data):
+    """No row of the option table may be forgotten."""
+    options = options_of_reconstruct()
+    assert len(options) > 80 and OWN < set(options), sorted(options)
+    known = harness.succeed("batch", "--help-all").stdout
+    missing = [flag for flag in options
+               if flag not in OWN and not re.search(re.escape(flag) + r"(?![\w-])", known)]
+    assert not missing
+    # A column that is unknown, or that takes another kind of value, is refused with its name.
+    columns = [flag[2:] for flag in options if flag not in OWN]
+    table = write_table(os.path.join(harness.SCRATCH, "all.csv"),
+                        [["stack", *columns], [os.path.join(data, "a.mrc"), *[""] * len(columns)]])
+    harness.succeed("batch", table, "--tlt", os.path.join(data, "a.tlt"), *QUICK, "--dry-run", "-o",
+                    harness.fresh_directory("all_columns"))
+
+
+def test_names_are_filled_in_for_each_series(data):
+    """Each file option of the table takes {folder} and {name}."""
+    folder = harness.fresh_directory("filled")
+    files = [flag for flag, value in options_of_reconstruct().items()
+             if value.strip("` ").startswith("FILE") and flag not in OWN]
+    assert {"--even", "--odd", "--mdoc", "--xf", "--aln", "--ctf", "--mask", "--local"} <= set(files)
+    files.remove("--fiducials")  # these are read with the views, after the plan
+    # What an option needs beside it.
+    others = {"--even": ["--odd", "{folder}/{name}.mrc"], "--odd": ["--even", "{folder}/{name}.mrc"],
+              "--mtf": ["--defocus", 3]}
+    for flag in files:
+        angles = [] if flag == "--tlt" else ["--tlt", "{folder}/{name}.tlt"]
+        refused = harness.tomofield("batch", os.path.join(data, "[ab].mrc"), *angles, *QUICK,
+                                    "--dry-run", "-o", folder, flag, "{folder}/of_{name}.none",
+                                    *others.get(flag, []))
+        assert refused.returncode == 2, (flag, refused.stdout)
+        for name in "ab":
+            assert os.path.join(data, f"of_{name}.none") in refused.stderr, (flag, refused.stderr)
+
+
+def test_a_batch_makes_halves(data):
+    folder, halves = harness.fresh_directory("halves"), harness.fresh_directory("frames")
+    random = np.random.default_rng(1)
+    for name in "ab":
+        for half in ("EVN", "ODD"):
+            views = harness.read_volume(os.path.join(data, name + ".mrc"))
+            noise = random.normal(0, 0.05 * np.ptp(views), views.shape)
+            harness.write_stack(os.path.join(halves, f"{name}_{half}.mrc"),
+                                (views + noise).astype(np.float32))
+    harness.succeed("batch", os.path.join(data, "[ab].mrc"), "--tlt", "{folder}/{name}.tlt",
+                    "--even", halves + "/{name}_EVN.mrc", "--odd", halves + "/{name}_ODD.mrc",
+                    *QUICK, "-o", folder)
+    for name in "ab":
+        assert os.path.isfile(os.path.join(folder, f"{name}_fsc.png"))
+        used = options_of(os.path.join(folder, name + ".mrc"))["input"]
+        assert used["even"] == os.path.join(halves, f"{name}_EVN.mrc")
 
 
 def test_a_series_that_fails_does_not_stop_the_others(data, first):

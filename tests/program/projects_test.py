@@ -157,11 +157,14 @@ def test_a_baseline_and_info_take_the_folder_too(series):
 
 def test_what_cannot_be_honoured_is_refused_or_said(series):
     folder = write_etomo(fresh_directory("refusals"), series, "THICKNESS 24",
-                         "LOCALFILE TS_01local.xf", "WOBBLE 3")
-    refuse(["tilt.com", "line 14", "LOCALFILE", "--ignore LOCALFILE"], folder, *REST)
-    _, printed = reconstruct("ignoring", folder, *REST, "--ignore", "LOCALFILE")
+                         "ZFACTORFILE TS_01.zfac", "WOBBLE 3")
+    np.savetxt(os.path.join(folder, "TS_01.zfac"), np.full((NUM_VIEWS, 2), [0.02, -0.05]))
+    # 0.05 times half of the thickness
+    refuse(["tilt.com", "line 14", "ZFACTORFILE", "by up to 0.6 pixels", "--ignore ZFACTORFILE"],
+           folder, *REST)
+    _, printed = reconstruct("ignoring", folder, *REST, "--ignore", "ZFACTORFILE")
     assert "warning: " in printed.stderr and "WOBBLE" in printed.stderr
-    refuse(["--ignore LOKALFILE"], folder, *REST, "--ignore", "LOCALFILE,LOKALFILE")
+    refuse(["--ignore LOKALFILE"], folder, *REST, "--ignore", "ZFACTORFILE,LOKALFILE")
     for axis in "ab":
         shutil.copy(os.path.join(folder, "tilt.com"), os.path.join(folder, f"tilt{axis}.com"))
     os.remove(os.path.join(folder, "tilt.com"))
@@ -329,7 +332,7 @@ def aretomo(folder, kept, sections, dark):
                  "# AlphaOffset =     0.00", "# BetaOffset =     0.00", f"# Thickness = {THICKNESS}",
                  "# SEC     ROT         GMAG       TX          TY      SMEAN     SFIT    SCALE     "
                  "BASE     TILT", *rows, "# Local Alignment",
-                 "   0   0  -558.42   -802.00   -100.07     24.43   1.0")
+                 "   0   0   -10.42     -8.00      0.00      0.00   1.0")
 
 
 def test_an_alignment_of_aretomo_has_its_thickness_and_dark_frames(series):
@@ -347,7 +350,7 @@ def test_an_alignment_of_aretomo_has_its_thickness_and_dark_frames(series):
     assert imported.volume.shape[0] == THICKNESS
     assert harness.read_bytes(imported.volume_path) == harness.read_bytes(by_hand.volume_path)
     assert f"--thickness {THICKNESS} from {aln}: Thickness" in printed.stdout
-    assert "local alignment, which is not applied" in printed.stderr
+    assert f"local alignment of '{aln}' in 1 views" in printed.stderr
     os.remove(stack)
     refuse(["TS_01.aln", "TS_01.mrc", "--aln"], aln, *REST)
 

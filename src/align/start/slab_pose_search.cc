@@ -130,8 +130,9 @@ bool SlabPoseSearch::counts(std::size_t view, double place, double thickness_px)
 
 // Returns the logarithm of the likelihood of each part of the rows, but for a constant. The
 // variance of the values is the likeliest one. `thickness_px` decides which values count, in all
-// poses.
-Eigen::VectorXd SlabPoseSearch::log_likelihood(const SlabPose& pose, double thickness_px) const {
+// poses. The middle of the slab is at `height_px` above that of the volume.
+Eigen::VectorXd SlabPoseSearch::log_likelihood(const SlabPose& pose, double thickness_px,
+                                               double height_px) const {
   const Eigen::Index columns = std::ssize(place_), n = columns * std::ssize(views_);
   const double grain = kGrain / kWidth * sigma_px_;
   const double variance = sigma_px_ * sigma_px_ + grain * grain;
@@ -146,7 +147,7 @@ Eigen::VectorXd SlabPoseSearch::log_likelihood(const SlabPose& pose, double thic
       for (std::int64_t i = 0; i < columns; ++i)
         for (std::int64_t j = 0; j < columns; ++j) {
           const double apart = place_[static_cast<std::size_t>(i)] / cos_v -
-                               place_[static_cast<std::size_t>(j)] / cos_w;
+                               place_[static_cast<std::size_t>(j)] / cos_w - slope * height_px;
           covariance(v * columns + i, w * columns + j) =
               integral_of_normal(apart, slope, sigma, pose.thickness_px) / (cos_v * cos_w);
         }
@@ -172,6 +173,28 @@ Eigen::VectorXd SlabPoseSearch::log_likelihood(const SlabPose& pose, double thic
     parts[row * kParts / values.cols()] +=
         of_row - 0.5 * values.col(row).squaredNorm() / mean_square + 0.5 * static_cast<double>(n);
   return parts;
+}
+
+// Fits a line through the heights of the parts of the rows. The likelihood of a part over the
+// height is a parabola with the mean bend of all parts.
+void SlabPoseSearch::find_x_tilt(double thickness_px, FoundPose& found) const {
+  const double step_px = sigma_px_;
+  const auto at = [&](double height_px) {
+    return log_likelihood(found.pose, thickness_px, height_px);
+  };
+  const Eigen::VectorXd below = at(-step_px), middle = at(0.0), above = at(step_px);
+  const double bend = (2 * middle - below - above).mean();
+  if (!(bend > 0.0)) return;
+  const Eigen::ArrayXd heights_px = 0.5 * step_px / bend * (above - below).array();
+  const double rows = static_cast<double>(views_.front().cols());
+  const Eigen::ArrayXd places_px =
+      ((Eigen::ArrayXd::LinSpaced(kParts, 0.5, kParts - 0.5) / kParts) - 0.5) * rows;
+  const double moment = places_px.square().sum();
+  const double slope = (places_px * heights_px).sum() / moment;
+  const Eigen::ArrayXd rest = heights_px - heights_px.mean() - slope * places_px;
+  const double variance = rest.square().sum() / (kParts - 2);
+  found.pose.x_tilt_deg = -hand_ * std::atan(slope) * 180.0 / std::numbers::pi;
+  found.error.x_tilt_deg = std::sqrt(variance / moment) * 180.0 / std::numbers::pi;
 }
 
 std::optional<FoundPose> SlabPoseSearch::find(const SlabPose& start) const {
@@ -202,13 +225,16 @@ std::optional<FoundPose> SlabPoseSearch::find(const SlabPose& start) const {
     best.thickness_px *=
         std::pow(factor, std::clamp(thickness->place, -kLongestStep, kLongestStep));
     found = {best,
-             {best.thickness_px * std::log(factor) * thickness->error, step_deg * pitch->error}};
+             {.thickness_px = best.thickness_px * std::log(factor) * thickness->error,
+              .pitch_deg = step_deg * pitch->error}};
     is_near = round > 0 && std::abs(pitch->place) < kNear && std::abs(thickness->place) < kNear;
   }
   const double change = best.thickness_px / start.thickness_px;
   const bool is_inside = change < kMostFactor && change > 1 / kMostFactor &&
                          std::abs(best.pitch_deg - start.pitch_deg) < kMostPitch_deg;
-  return is_near && is_inside ? std::optional(found) : std::nullopt;
+  if (!is_near || !is_inside) return std::nullopt;
+  find_x_tilt(start.thickness_px, found);
+  return found;
 }
 
 }  // namespace tomofield::alignment

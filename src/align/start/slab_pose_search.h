@@ -33,15 +33,19 @@ class SlabPoseSearch {
   void add(std::size_t view, const ImagePair& images);
 
   /// Returns the most likely pose near `start`: within a factor of two of its thickness and 12° of
-  /// its pitch. Errors are standard errors, from the differences between parts of the rows. Returns
-  /// nothing if the images are too low, or if the likelihood has no maximum there.
+  /// its pitch. The x-axis tilt follows from the heights at which the rows of a part of the image
+  /// are most likely: they lie on a line. Errors are standard errors, from the differences between
+  /// parts of the rows. Returns nothing if the images are too low, or if the likelihood has no
+  /// maximum there.
   std::optional<FoundPose> find(const SlabPose& start) const;
 
  private:
   using Columns = Eigen::MatrixXd;  // [column, row]
   Columns reduce(std::span<const float> image) const;
   bool counts(std::size_t view, double place, double thickness_px) const;
-  Eigen::VectorXd log_likelihood(const SlabPose& pose, double thickness_px) const;
+  Eigen::VectorXd log_likelihood(const SlabPose& pose, double thickness_px,
+                                 double height_px = 0.0) const;
+  void find_x_tilt(double thickness_px, FoundPose& found) const;
 
   std::vector<double> tilt_deg_;
   int hand_;

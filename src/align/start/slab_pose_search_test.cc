@@ -15,8 +15,10 @@ namespace {
 constexpr std::int64_t kSize = 64;
 constexpr double kThickness = 30;
 
-// Returns the pose that views of an extended slab tell whose tilt angles are given with an error.
-std::optional<FoundPose> find_pose(double given_thickness, double tilt_error_deg, int hand = 1) {
+// Returns the pose that views of an extended slab tell whose tilt angles are given with an error,
+// and whose rows lie higher by `rise` for each pixel of y.
+std::optional<FoundPose> find_pose(double given_thickness, double tilt_error_deg, int hand = 1,
+                                   double rise = 0.0) {
   const testing::GaussianScene scene(500, {95, 40, kThickness / 2});
   base::Random random(3);
   std::vector<double> given_deg;
@@ -27,7 +29,9 @@ std::optional<FoundPose> find_pose(double given_thickness, double tilt_error_deg
     for (std::int64_t i = 0; i < kSize * kSize; ++i) {
       const double x = static_cast<double>(i % kSize) + 0.5 - kSize / 2.0;
       const double y = static_cast<double>(i / kSize) + 0.5 - kSize / 2.0;
-      const double shown = scene.projection(x, y, hand * (given_deg[view] - tilt_error_deg));
+      const double tilt_deg = given_deg[view] - tilt_error_deg;
+      const double moved = x - hand * rise * y * std::sin(tilt_deg * M_PI / 180);
+      const double shown = scene.projection(moved, y, hand * tilt_deg);
       image.push_back(static_cast<float>(shown + 0.1 * random.normal()));
     }
     image[17] = std::nanf("");
@@ -52,6 +56,21 @@ TEST(SlabPoseSearch, TheHandTurnsThePitchWithTheTilts) {
   const auto found = find_pose(30, 6.0, -1);
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->pose.pitch_deg, -6.0, 1.5);
+}
+
+// A specimen that is turned by alpha about X lies at the heights hand · tan(alpha) y: its x-axis
+// tilts are too small by alpha (docs/geometry.md).
+TEST(SlabPoseSearch, FindsTheXAxisTilt) {
+  for (const int hand : {1, -1}) {
+    for (const double alpha_deg : {0.0, 4.0, -8.0}) {
+      const auto found = find_pose(36, 3.0, hand, hand * std::tan(alpha_deg * M_PI / 180));
+      ASSERT_TRUE(found);
+      EXPECT_NEAR(found->pose.x_tilt_deg, -alpha_deg, 2.0) << hand;
+      EXPECT_NEAR(found->pose.pitch_deg, -3.0, 1.5);
+      EXPECT_GT(found->error.x_tilt_deg, 0.0);
+      EXPECT_LT(found->error.x_tilt_deg, 3.0);
+    }
+  }
 }
 
 TEST(SlabPoseSearch, LowImagesTellNothing) {

@@ -318,8 +318,10 @@ void add_batch_command(CLI::App& program) {
   const auto own_options = add_own_options(command, *arguments);
   add_series_options(command, arguments->choices);
   add_groups(command, arguments->choices,
-             {Group::kTransfer, Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume});
-  add_row(command, "running.checkpoint_minutes", arguments->choices);
+             {Group::kTransfer, Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume,
+              Group::kHalves});
+  for (const char* key : {"running.checkpoint_minutes", "running.alignment_json"})
+    add_row(command, key, arguments->choices);
   add_groups(command, arguments->choices, {Group::kResearch});
   for (CLI::Option* option : command.get_options()) {  // a table may have what a series needs
     const bool is_required_of_a_run = row_of_option(*option) != nullptr && option->get_required();

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -7,8 +8,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "base/log.h"
 #include "cli/commands/commands.h"
 #include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
@@ -17,9 +20,13 @@
 #include "cli/terminal/console.h"
 #include "compact/budget.h"
 #include "compact/compress.h"
+#include "exchange/particles/particle_list.h"
+#include "exchange/particles/particle_stack.h"
 #include "io/saving/output_files.h"
 #include "io/saving/output_lock.h"
 #include "io/saving/output_set.h"
+#include "output/box_bounds.h"
+#include "output/found_levelling.h"
 #include "output/model_file.h"
 #include "output/volume.h"
 #include "tomofield/error.h"
@@ -33,9 +40,13 @@ using output::Model;
 struct ExportArguments {
   std::filesystem::path model;
   std::filesystem::path output;
-  std::filesystem::path compact;  // model to write in place of a volume
-  std::string budget = "0.1dB";   // of that model
-  std::vector<double> box, centre, rotation;
+  std::filesystem::path compact;    // model to write in place of a volume
+  std::string budget = "0.1dB";     // of that model
+  std::filesystem::path particles;  // list of places to cut out
+  std::string tomogram;             // whose particles these are
+  std::string box;                  // corners, or the side of the boxes of particles in voxels
+  std::string level;                // kFound, or two angles
+  std::vector<double> centre, rotation;
   std::vector<std::int64_t> size;
   std::optional<double> voxel_size_A;
   double bin = 1.0;
@@ -43,13 +54,20 @@ struct ExportArguments {
   bool overwrite = false;
 };
 
-// Checks that the file can be written, and locks it.
+constexpr const char* kFound = "found";
+
+// Checks that the files can be written, and locks the first one.
 std::vector<io::OutputLock> claim_output(const ExportArguments& arguments) {
   const std::filesystem::path& written =
       arguments.compact.empty() ? arguments.output : arguments.compact;
   return io::claim_outputs({written}, [&] {
     constexpr const char* kAdvice = "give another name, or --overwrite to replace it";
-    io::check_output_files({written}, {arguments.model}, arguments.overwrite, kAdvice);
+    std::vector<std::filesystem::path> results{written}, inputs{arguments.model};
+    if (!arguments.particles.empty()) {
+      results.push_back(exchange::particle_star(written));
+      inputs.push_back(arguments.particles);
+    }
+    io::check_output_files(results, inputs, arguments.overwrite, kAdvice);
     if (arguments.compact.empty()) io::require_volume_name(arguments.output);
     if (arguments.compact.empty() && arguments.choices.options.volume.zarr)
       output::check_zarr(arguments.output, arguments.overwrite, kAdvice);
@@ -58,15 +76,41 @@ std::vector<io::OutputLock> claim_output(const ExportArguments& arguments) {
 
 field::Point point(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
 
-OrientedBox unrotated_box(const ExportArguments& arguments, const Model& model) {
-  const double voxel_px =
-      arguments.voxel_size_A ? *arguments.voxel_size_A / model.pixel_size_A : arguments.bin;
-  if (!arguments.size.empty())
-    return {.centre_px = point(arguments.centre.data()),
-            .size = {arguments.size[0], arguments.size[1], arguments.size[2]},
-            .voxel_px = voxel_px};
-  if (arguments.box.empty()) return output::region_box(model, voxel_px);
-  const field::Point low = point(arguments.box.data()), high = point(arguments.box.data() + 3);
+// Parses numbers with commas between them. Throws Error unless there are `count` finite ones.
+std::vector<double> parse_numbers(const std::string& text, std::size_t count,
+                                  const std::string& what) {
+  std::vector<double> numbers;
+  for (const std::string& word : CLI::detail::split(text, ',')) {
+    double number = std::numeric_limits<double>::quiet_NaN();
+    if (CLI::detail::lexical_cast(word, number) && std::isfinite(number)) numbers.push_back(number);
+  }
+  if (numbers.size() == count && std::ranges::count(text, ',') + 1 == std::ssize(numbers))
+    return numbers;
+  throw Error(fmt::format("'{}' is not {}", text, what));
+}
+
+output::Levelling levelling_of(const ExportArguments& arguments) {
+  constexpr double kLargest_deg = 90.0;
+  if (arguments.level.empty()) return {};
+  if (arguments.level == kFound) return output::found_levelling(arguments.model);
+  const auto angles =
+      parse_numbers(arguments.level, 2, "PITCH,X_TILT in degrees, or 'found' (--level)");
+  for (const double angle : angles)
+    if (std::abs(angle) >= kLargest_deg)
+      throw Error(fmt::format("--level {} has an angle that is not below 90°", arguments.level));
+  return {.pitch_deg = angles[0], .x_tilt_deg = angles[1]};
+}
+
+double voxel_px_of(const ExportArguments& arguments, const Model& model) {
+  return arguments.voxel_size_A ? *arguments.voxel_size_A / model.pixel_size_A : arguments.bin;
+}
+
+OrientedBox box_between_corners(const std::string& corners, double voxel_px) {
+  const std::vector<double> numbers =
+      parse_numbers(corners, 6,
+                    "x0,y0,z0,x1,y1,z1 (--box); the side of boxes alone is for "
+                    "--particles");
+  const field::Point low = point(numbers.data()), high = point(numbers.data() + 3);
   for (std::size_t a = 0; a < 3; ++a) {
     const double voxels = (high[a] - low[a]) / voxel_px;
     if (voxels > 0 && voxels <= std::numeric_limits<std::int32_t>::max()) continue;
@@ -76,6 +120,42 @@ OrientedBox unrotated_box(const ExportArguments& arguments, const Model& model) 
         "xyz"[a], low[a], high[a], voxels));
   }
   return field::box_between(low, high, voxel_px);
+}
+
+// Warns of a box beyond the region of interest.
+void warn_of_margin(const Model& model, const OrientedBox& box) {
+  const output::BoxBounds bounds(box), region = output::region_bounds(model);
+  const auto axis = bounds.axis_beyond(region, 0.5 * box.voxel_px);
+  if (!axis) return;
+  base::log_warning(fmt::format(
+      "the box reaches outside the region that was reconstructed: its {} runs from {:.6g} to "
+      "{:.6g} px, the region's from {:.6g} to {:.6g}; what lies there is a guess or nothing",
+      "xyz"[*axis], bounds.low[*axis], bounds.high[*axis], region.low[*axis], region.high[*axis]));
+}
+
+// Returns the box that the user describes, in the field.
+OrientedBox exported_box(const ExportArguments& arguments, const Model& model) {
+  const double voxel_px = voxel_px_of(arguments, model);
+  const output::Levelling levelling = levelling_of(arguments);
+  const auto& angles = arguments.rotation;
+  const field::Rotation rotation =
+      angles.empty() ? field::kNoRotation
+                     : field::rotation_from_euler(angles[0], angles[1], angles[2]);
+  if (arguments.size.empty() && arguments.box.empty()) {
+    OrientedBox box = output::region_box(model, voxel_px, levelling);
+    if (!angles.empty()) box.field_from_box = rotation;
+    return box;
+  }
+  OrientedBox box =
+      arguments.size.empty()
+          ? box_between_corners(arguments.box, voxel_px)
+          : OrientedBox{.centre_px = point(arguments.centre.data()),
+                        .size = {arguments.size[0], arguments.size[1], arguments.size[2]},
+                        .voxel_px = voxel_px};
+  box.field_from_box = rotation;
+  if (!arguments.level.empty()) box = output::VolumeFrame(model, levelling).to_field(box);
+  warn_of_margin(model, box);
+  return box;
 }
 
 // Writes the model again with factors in place of its vertices.
@@ -106,22 +186,52 @@ void write_compact(const ExportArguments& arguments) {
       std::sqrt(made.report.mean_square_change / made.report.variance));
 }
 
-void run_export(ExportArguments& arguments) {
-  if (arguments.output.empty() && arguments.compact.empty())
-    throw Error("nothing to write: give -o VOLUME.mrc, or --compact MODEL.h5");
-  const std::vector<io::OutputLock> locks = claim_output(arguments);
-  if (!arguments.compact.empty()) return write_compact(arguments);
-  const Model model = output::load_undecoded(arguments.model);
-  OrientedBox box = unrotated_box(arguments, model);
-  const auto& angles = arguments.rotation;
-  if (!angles.empty())
-    box.field_from_box = field::rotation_from_euler(angles[0], angles[1], angles[2]);
+void export_volume(const ExportArguments& arguments, const Model& model) {
+  const OrientedBox box = exported_box(arguments, model);
   io::OutputSet results;
   output::write_volume(model, arguments.choices.options.volume, arguments.output, {.box = box});
   results.commit();
   print("{}: {} × {} × {} voxels (x, y, z) of {:.6g} Å about {:.6g}, {:.6g}, {:.6g} px\n",
         arguments.output.string(), box.size[0], box.size[1], box.size[2],
         box.voxel_px * model.pixel_size_A, box.centre_px[0], box.centre_px[1], box.centre_px[2]);
+}
+
+void export_particles(const ExportArguments& arguments, const Model& model) {
+  constexpr double kLargestSide = 4096;
+  const double side =
+      arguments.box.empty()
+          ? 0.0
+          : parse_numbers(arguments.box, 1, "the side of the boxes in voxels (--box N)").front();
+  if (!(side >= 1 && side <= kLargestSide && side == std::floor(side)))
+    throw Error("--particles needs the side of their boxes in voxels: --box N, from 1 to 4096");
+  const exchange::ParticleBoxes boxes{.size = static_cast<std::int64_t>(side),
+                                      .voxel_px = voxel_px_of(arguments, model),
+                                      .levelling = levelling_of(arguments)};
+  exchange::ParticleList list =
+      exchange::read_particle_list(arguments.particles, arguments.model, model, arguments.tomogram);
+  const std::size_t count = list.particles.size();
+  io::OutputSet results;
+  const std::size_t num_cut = exchange::write_particles(
+      model, std::move(list), boxes, arguments.choices.options.volume, arguments.output);
+  results.commit();
+  print("{}: {} particles in boxes of {}³ voxels of {:.6g} Å; their list is {}\n",
+        arguments.output.string(), count, boxes.size, boxes.voxel_px * model.pixel_size_A,
+        exchange::particle_star(arguments.output).string());
+  if (num_cut == 0) return;
+  print(
+      "{} of the {} boxes reach outside the region that was reconstructed: what lies there is a "
+      "guess, or 0\n",
+      num_cut, count);
+}
+
+void run_export(ExportArguments& arguments) {
+  if (arguments.output.empty() && arguments.compact.empty())
+    throw Error("nothing to write: give -o VOLUME.mrc, or --compact MODEL.h5");
+  const std::vector<io::OutputLock> locks = claim_output(arguments);
+  if (!arguments.compact.empty()) return write_compact(arguments);
+  const Model model = output::load_undecoded(arguments.model);
+  arguments.particles.empty() ? export_volume(arguments, model)
+                              : export_particles(arguments, model);
 }
 
 void add_box_options(CLI::App& command, ExportArguments& arguments) {
@@ -133,13 +243,10 @@ void add_box_options(CLI::App& command, ExportArguments& arguments) {
       "", "finite");
   CLI::Option* box =
       command
-          .add_option(
-              "--box", arguments.box,
-              "Corners of the box (default: the region of interest and the whole thickness)")
-          ->delimiter(',')
-          ->expected(6)
-          ->type_name("X0,Y0,Z0,X1,Y1,Z1")
-          ->check(finite)
+          .add_option("--box", arguments.box,
+                      "Corners of the box (default: the region of interest and the whole "
+                      "thickness); with --particles, the side of their boxes in voxels")
+          ->type_name("X0,Y0,Z0,X1,Y1,Z1 or N")
           ->group(group);
   CLI::Option* centre = command.add_option("--center", arguments.centre, "Centre of the box")
                             ->delimiter(',')
@@ -156,19 +263,29 @@ void add_box_options(CLI::App& command, ExportArguments& arguments) {
                           ->needs(centre)
                           ->group(group);
   centre->needs(size);
+  CLI::Option* rotate =
+      command
+          .add_option(
+              "--rotate", arguments.rotation,
+              "RELION's Euler angles in degrees (rlnAngleRot, rlnAngleTilt, rlnAnglePsi). The "
+              "box turns about its centre, so that a particle appears in the orientation of "
+              "its reference")
+          ->delimiter(',')
+          ->expected(3)
+          ->type_name("ROT,TILT,PSI")
+          ->check(finite)
+          ->group(group);
   command
-      .add_option("--rotate", arguments.rotation,
-                  "RELION's Euler angles in degrees (rlnAngleRot, rlnAngleTilt, rlnAnglePsi). The "
-                  "box turns about its centre, so that a particle appears in the orientation of "
-                  "its reference")
-      ->delimiter(',')
-      ->expected(3)
-      ->type_name("ROT,TILT,PSI")
-      ->check(finite)
+      .add_option("--level", arguments.level,
+                  "Turn a tilted specimen back by what --align found, or by two angles in degrees, "
+                  "as --tilt-offset PITCH and --x-axis-tilt X_TILT would")
+      ->type_name("found|PITCH,X_TILT")
+      ->excludes(rotate)
       ->group(group);
+
   const CLI::Validator positive = number_between(1e-3, 1e6);
   CLI::Option* voxel_size = command
-                                .add_option("--voxel-size", arguments.voxel_size_A,
+                                .add_option("--voxel-size,--angpix", arguments.voxel_size_A,
                                             "Voxel size in Å (default: the pixel size)")
                                 ->check(positive)
                                 ->group(group);
@@ -184,8 +301,8 @@ void add_export_command(CLI::App& program) {
   auto arguments = std::make_shared<ExportArguments>();
   CLI::App* command = program.add_subcommand(
       "export",
-      "Write any box of a model, at any voxel size and orientation, as an MRC volume; or make a "
-      "model compact");
+      "Write any box of a model, at any voxel size and orientation, as an MRC volume; or cut out "
+      "particles; or make a model compact");
   command->add_option("model", arguments->model, "Model file (.h5) of reconstruct")->required();
   CLI::Option* volume =
       command->add_option("-o,--output", arguments->output, "The MRC volume to write");
@@ -202,7 +319,23 @@ void add_export_command(CLI::App& program) {
       ->needs(compact);
   command->add_flag("--overwrite", arguments->overwrite, "Replace an existing file");
   add_box_options(*command, *arguments);
+  CLI::Option* particles =
+      command
+          ->add_option(
+              "--particles", arguments->particles,
+              "Cut out particles (STAR of RELION 5, or text of model2point) into one stack "
+              "of subvolumes, with a STAR file beside it")
+          ->type_name("FILE")
+          ->excludes(compact);
+  command
+      ->add_option("--tomogram", arguments->tomogram,
+                   "Whose particles to take, if the file has those of several tomograms "
+                   "(rlnTomoName; default: the name of the model)")
+      ->type_name("NAME")
+      ->needs(particles);
   add_groups(*command, arguments->choices, {option_table::Group::kVolume});
+  for (const char* of_volume : {"--center", "--rotate", "--zarr", "--axes"})
+    particles->excludes(command->get_option(of_volume));
   add_common_options(*command);
   add_help_all(*command);
   command->callback([arguments] { run_export(*arguments); });

@@ -33,9 +33,10 @@ struct MrcHeader {
   std::array<double, 3> voxel_size_A{1.0, 1.0, 1.0};
   std::array<double, 3> origin_A{0.0, 0.0, 0.0};  ///< of a part in the whole, as MRC2014 has it
   double min = 0.0, max = 0.0, mean = 0.0, rms = 0.0;
-  bool is_volume = false;           ///< ISPG 1; 0 is a stack of images
-  bool is_byte_swapped = false;     ///< written on a machine of the other byte order
-  bool bytes_are_unsigned = false;  ///< mode 0 with IMOD's stamp and without its signed flag
+  bool is_volume = false;              ///< ISPG 1; 0 is a stack of images
+  std::int64_t sections_a_volume = 0;  ///< written with ISPG 401: a stack of volumes; else 0
+  bool is_byte_swapped = false;        ///< written on a machine of the other byte order
+  bool bytes_are_unsigned = false;     ///< mode 0 with IMOD's stamp and without its signed flag
   std::int64_t extended_header_bytes = 0;
   std::string extended_header_type;
   std::vector<double> extended_tilt_deg;  ///< angles in the extended header, one a section, or none
@@ -78,7 +79,8 @@ struct MrcSpec {
   std::array<double, 3> voxel_size_A{1.0, 1.0, 1.0};
   std::array<double, 3> origin_A{0.0, 0.0, 0.0};  ///< of a part in the whole
   bool is_volume = true;
-  std::vector<std::string> labels;  ///< how it was made: at most 10, of 80 characters each
+  std::int64_t sections_a_volume = 0;  ///< of each volume of a stack of volumes; 0: no such stack
+  std::vector<std::string> labels;     ///< how it was made: at most 10, of 80 characters each
 };
 
 /// Writes an MRC file piece by piece into a temporary file beside `path`. Only close() replaces

@@ -238,15 +238,27 @@ std::int64_t expected_file_bytes(const MrcHeader& header, const std::string& nam
   return bytes;
 }
 
+namespace {
+
+// Returns the space group of MRC2014: 0 for images, 1 for a volume, 401 for a stack of volumes,
+// whose MZ counts the sections of one.
+std::int32_t space_group(const MrcHeader& header) {
+  if (header.sections_a_volume > 0) return 401;
+  return header.is_volume ? 1 : 0;
+}
+
+}  // namespace
+
 MrcHeaderBytes encode_mrc_header(const MrcHeader& header) {
   MrcHeaderBytes bytes{};
   const std::array<std::int64_t, 3> sizes{header.nx, header.ny, header.nz};
+  std::array<std::int64_t, 3> samples = sizes;
+  if (header.sections_a_volume > 0) samples[2] = header.sections_a_volume;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto size = static_cast<std::int32_t>(sizes[axis]);
-    put<std::int32_t>(bytes, kSize + 4 * axis, size);
-    put<std::int32_t>(bytes, kSampling + 4 * axis, size);
+    put<std::int32_t>(bytes, kSize + 4 * axis, static_cast<std::int32_t>(sizes[axis]));
+    put<std::int32_t>(bytes, kSampling + 4 * axis, static_cast<std::int32_t>(samples[axis]));
     put<float>(bytes, kCell + 4 * axis,
-               static_cast<float>(header.voxel_size_A[axis] * static_cast<double>(size)));
+               static_cast<float>(header.voxel_size_A[axis] * static_cast<double>(samples[axis])));
     put<float>(bytes, kAngles + 4 * axis, 90.0f);
     put<std::int32_t>(bytes, kAxes + 4 * axis, static_cast<std::int32_t>(axis) + 1);
     put<float>(bytes, kOrigin + 4 * axis, static_cast<float>(header.origin_A[axis]));
@@ -256,7 +268,7 @@ MrcHeaderBytes encode_mrc_header(const MrcHeader& header) {
   put<float>(bytes, kMax, static_cast<float>(header.max));
   put<float>(bytes, kMean, static_cast<float>(header.mean));
   put<float>(bytes, kRms, static_cast<float>(header.rms));
-  put<std::int32_t>(bytes, kSpaceGroup, header.is_volume ? 1 : 0);
+  put<std::int32_t>(bytes, kSpaceGroup, space_group(header));
   put<std::int32_t>(bytes, kVersion, 20141);
   put<std::int32_t>(bytes, kImodStamp, kImodStampValue);
   const std::int32_t signed_bytes = header.mode == MrcMode::kInt8 ? kImodSignedBytes : 0;

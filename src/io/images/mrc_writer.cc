@@ -52,6 +52,7 @@ MrcHeader header_of(const MrcSpec& spec, const std::string& name) {
   header.voxel_size_A = spec.voxel_size_A;
   header.origin_A = spec.origin_A;
   header.is_volume = spec.is_volume;
+  header.sections_a_volume = spec.sections_a_volume;
   header.labels = spec.labels;
   return header;
 }

@@ -104,18 +104,17 @@ nlohmann::json dataset(int level, const MrcHeader& volume) {
             {{"type", "translation"}, {"translation", translation}}}}};
 }
 
-nlohmann::json attributes(const std::string& name, const MrcHeader& volume, int num_levels) {
+// Describes the volume and its levels. In 0.5 the version stands beside this.
+nlohmann::json multiscale(const std::string& name, const MrcHeader& volume, int num_levels) {
   nlohmann::json axes = nlohmann::json::array(), datasets = nlohmann::json::array();
   for (const char* axis : {"z", "y", "x"})
     axes.push_back({{"name", axis}, {"type", "space"}, {"unit", "angstrom"}});
   for (int level = 0; level < num_levels; ++level) datasets.push_back(dataset(level, volume));
-  return {{"multiscales",
-           {{{"version", "0.4"},
-             {"name", name},
-             {"axes", axes},
-             {"datasets", datasets},
-             {"type", "mean"},
-             {"metadata", {{"tomofield", library_version()}, {"labels", volume.labels}}}}}}};
+  return {{"name", name},
+          {"axes", axes},
+          {"datasets", datasets},
+          {"type", "mean"},
+          {"metadata", {{"tomofield", library_version()}, {"labels", volume.labels}}}};
 }
 
 void write_text(const std::filesystem::path& path, const nlohmann::json& json) {
@@ -125,26 +124,37 @@ void write_text(const std::filesystem::path& path, const nlohmann::json& json) {
   file.close();
 }
 
+void write_group(const std::filesystem::path& root, nlohmann::json scales, ZarrVersion version) {
+  if (version == ZarrVersion::k05) {
+    const nlohmann::json ome{{"version", "0.5"}, {"multiscales", {scales}}};
+    write_text(root / "zarr.json",
+               {{"zarr_format", 3}, {"node_type", "group"}, {"attributes", {{"ome", ome}}}});
+    return;
+  }
+  scales["version"] = "0.4";
+  write_text(root / ".zattrs", {{"multiscales", {scales}}});
+  write_text(root / ".zgroup", {{"zarr_format", 2}});
+}
+
 }  // namespace
 
 void write_ome_zarr(const std::filesystem::path& mrc, const std::filesystem::path& zarr,
-                    const std::string& name) {
+                    const std::string& name, ZarrVersion version) {
   const MrcReader volume(mrc);
   const MrcHeader& header = volume.header();
   AtomicFolder folder(zarr, kZarrMarker);
   const std::filesystem::path root = folder.temporary_path();
   std::vector<ZarrArray> arrays;
-  arrays.emplace_back(root / "0", Size{header.nx, header.ny, header.nz}, header.mode);
+  arrays.emplace_back(root / "0", Size{header.nx, header.ny, header.nz}, header.mode, version);
   copy_volume(volume, arrays.back());
   while (std::ranges::max(arrays.back().size()) > ZarrArray::kSide) {
     Size half = arrays.back().size();
     for (std::int64_t& side : half) side = (side + 1) / 2;
-    ZarrArray coarser(root / std::to_string(arrays.size()), half, header.mode);
+    ZarrArray coarser(root / std::to_string(arrays.size()), half, header.mode, version);
     average_pairs(arrays.back(), coarser);
     arrays.push_back(std::move(coarser));
   }
-  write_text(root / ".zattrs", attributes(name, header, static_cast<int>(arrays.size())));
-  write_text(root / ".zgroup", {{"zarr_format", 2}});
+  write_group(root, multiscale(name, header, static_cast<int>(arrays.size())), version);
   write_text(root / kZarrMarker, {{"made_by", library_version()}});
   folder.commit();
 }

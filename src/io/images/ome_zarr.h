@@ -3,21 +3,22 @@
 #include <filesystem>
 #include <string>
 
+#include "tomofield/options.h"
+
 namespace tomofield::io {
 
 /// The file by which a folder is known as a store that this program made; only such a folder is
 /// replaced.
 inline constexpr const char* kZarrMarker = ".tomofield";
 
-/// Writes an MRC volume as OME-Zarr 0.4 (a Zarr group of version 2,
-/// https://ngff.openmicroscopy.org/ 0.4): axes z, y, x in Å, the volume itself in the array "0",
-/// and in "1", "2", … the means of 2 × 2 × 2 voxels of the array before, until one chunk holds all.
-/// Chunks are uncompressed and have 64 voxels a side. ORIGIN becomes a translation. Voxels stay
-/// float32, float16 or int16.
+/// Writes an MRC volume as OME-Zarr (https://ngff.openmicroscopy.org/): axes z, y, x in Å, the
+/// volume itself in the array "0", and in "1", "2", … the means of 2 × 2 × 2 voxels of the array
+/// before, until one chunk holds all. Chunks are uncompressed and have 64 voxels a side. ORIGIN
+/// becomes a translation. Voxels stay float32, float16 or int16.
 ///
 /// Holds 64 rows of 64 sections at once, however large the volume is. The folder appears as a whole
 /// (AtomicFolder). Throws Error if it cannot be written.
 void write_ome_zarr(const std::filesystem::path& mrc, const std::filesystem::path& zarr,
-                    const std::string& name);
+                    const std::string& name, ZarrVersion version);
 
 }  // namespace tomofield::io

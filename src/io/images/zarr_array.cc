@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "base/check.h"
@@ -17,8 +19,9 @@ namespace tomofield::io {
 namespace fs = std::filesystem;
 namespace {
 
-const char* type_name(MrcMode mode) {
-  return mode == MrcMode::kInt16 ? "<i2" : mode == MrcMode::kFloat16 ? "<f2" : "<f4";
+const char* pick(MrcMode mode, const char* of_int16, const char* of_float16,
+                 const char* of_float32) {
+  return mode == MrcMode::kInt16 ? of_int16 : mode == MrcMode::kFloat16 ? of_float16 : of_float32;
 }
 
 void make_folders(const fs::path& folder) {
@@ -34,26 +37,52 @@ void write_file(const fs::path& path, std::span<const std::byte> bytes) {
   file.close();
 }
 
+nlohmann::json description_2(const nlohmann::json& shape, const nlohmann::json& chunk,
+                             MrcMode mode) {
+  return {{"zarr_format", 2},
+          {"shape", shape},
+          {"chunks", chunk},
+          {"dtype", pick(mode, "<i2", "<f2", "<f4")},
+          {"compressor", nullptr},
+          {"fill_value", 0},
+          {"order", "C"},
+          {"filters", nullptr},
+          {"dimension_separator", "/"}};
+}
+
+// https://zarr-specs.readthedocs.io, "Zarr core specification (version 3)".
+nlohmann::json description_3(const nlohmann::json& shape, const nlohmann::json& chunk,
+                             MrcMode mode) {
+  const auto named = [](const char* name, nlohmann::json configuration) {
+    return nlohmann::json{{"name", name}, {"configuration", std::move(configuration)}};
+  };
+  const nlohmann::json bytes = named("bytes", {{"endian", "little"}});
+  return {{"zarr_format", 3},
+          {"node_type", "array"},
+          {"shape", shape},
+          {"data_type", pick(mode, "int16", "float16", "float32")},
+          {"chunk_grid", named("regular", {{"chunk_shape", chunk}})},
+          {"chunk_key_encoding", named("default", {{"separator", "/"}})},
+          {"codecs", nlohmann::json::array({bytes})},
+          {"fill_value", mode == MrcMode::kInt16 ? nlohmann::json(0) : nlohmann::json(0.0)},
+          {"dimension_names", {"z", "y", "x"}}};
+}
+
 }  // namespace
 
-ZarrArray::ZarrArray(const fs::path& folder, const std::array<std::int64_t, 3>& size, MrcMode mode)
-    : folder_(folder), size_(size), mode_(mode) {
+ZarrArray::ZarrArray(const fs::path& folder, const std::array<std::int64_t, 3>& size, MrcMode mode,
+                     ZarrVersion version)
+    : chunks_(version == ZarrVersion::k05 ? folder / "c" : folder), size_(size), mode_(mode) {
   make_folders(folder);
-  const nlohmann::json description{{"zarr_format", 2},
-                                   {"shape", {size[2], size[1], size[0]}},
-                                   {"chunks", {kSide, kSide, kSide}},
-                                   {"dtype", type_name(mode)},
-                                   {"compressor", nullptr},
-                                   {"fill_value", 0},
-                                   {"order", "C"},
-                                   {"filters", nullptr},
-                                   {"dimension_separator", "/"}};
-  const std::string text = description.dump(2);
-  write_file(folder / ".zarray", std::as_bytes(std::span(text)));
+  const nlohmann::json shape{size[2], size[1], size[0]}, chunk{kSide, kSide, kSide};
+  const bool is_3 = version == ZarrVersion::k05;
+  const std::string text =
+      (is_3 ? description_3(shape, chunk, mode) : description_2(shape, chunk, mode)).dump(2);
+  write_file(folder / (is_3 ? "zarr.json" : ".zarray"), std::as_bytes(std::span(text)));
 }
 
 fs::path ZarrArray::chunk_path(std::int64_t z, std::int64_t y, std::int64_t x) const {
-  return folder_ / std::to_string(z) / std::to_string(y) / std::to_string(x);
+  return chunks_ / std::to_string(z) / std::to_string(y) / std::to_string(x);
 }
 
 void ZarrArray::write_chunks(std::int64_t chunk_z, std::int64_t chunk_y,

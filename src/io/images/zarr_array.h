@@ -6,18 +6,20 @@
 #include <span>
 
 #include "io/images/mrc.h"
+#include "tomofield/options.h"
 
 namespace tomofield::io {
 
-/// An array of a Zarr group of version 2, in a folder: [z, y, x] in uncompressed chunks of kSide
-/// voxels a side, each in a file "z/y/x". Chunks at the ends are filled up with zeros.
+/// An array of a Zarr group, in a folder: [z, y, x] in uncompressed chunks of kSide voxels a side.
+/// Each is a file "z/y/x", or "c/z/y/x" in a group of version 3. Chunks at the ends are filled up
+/// with zeros.
 class ZarrArray {
  public:
   static constexpr std::int64_t kSide = 64;
 
-  /// Makes the folder with its .zarray. `size` is (x, y, z).
+  /// Makes the folder with its description. `size` is (x, y, z).
   ZarrArray(const std::filesystem::path& folder, const std::array<std::int64_t, 3>& size,
-            MrcMode mode);
+            MrcMode mode, ZarrVersion version);
 
   const std::array<std::int64_t, 3>& size() const { return size_; }
   /// Returns the number of chunks along an axis (0: x).
@@ -33,7 +35,7 @@ class ZarrArray {
  private:
   std::filesystem::path chunk_path(std::int64_t z, std::int64_t y, std::int64_t x) const;
 
-  std::filesystem::path folder_;
+  std::filesystem::path chunks_;  // the folder of their files
   std::array<std::int64_t, 3> size_;
   MrcMode mode_;
 };

@@ -76,8 +76,9 @@ void require_volume_name(const std::filesystem::path& volume) {
 
 std::vector<fs::path> input_files(const SeriesFiles& input) {
   std::vector<fs::path> files{input.stack};
-  for (const auto& file : {input.tlt, input.xf, input.xtilt, input.aln, input.mdoc, input.fiducials,
-                           input.mask, input.even, input.odd, input.ctf, input.mtf}) {
+  for (const auto& file :
+       {input.tlt, input.xf, input.xtilt, input.local, input.aln, input.mdoc, input.fiducials,
+        input.mask, input.even, input.odd, input.ctf, input.mtf}) {
     if (file) files.push_back(*file);
   }
   return files;

@@ -118,6 +118,12 @@ struct AreTomoRow {
   double tilt_deg = 0.0;
 };
 
+/// How AreTomo moves one patch of one section beyond the alignment of all of it, in pixels. The
+/// place counts from the centre of the raw image, where the global shift is undone.
+struct AreTomoPatch {
+  double x_px = 0.0, y_px = 0.0, shift_x_px = 0.0, shift_y_px = 0.0;
+};
+
 /// The contents of AreTomo's .aln file.
 struct AreTomoAlignment {
   std::optional<std::array<std::int64_t, 3>> raw_size;  ///< size of the stack that was aligned
@@ -128,10 +134,11 @@ struct AreTomoAlignment {
   double beta_offset_deg = 0.0;
   std::optional<double> thickness;  ///< of the specimen, in pixels; none if it was not measured
   std::vector<AreTomoRow> rows;
-  std::int64_t num_local_rows = 0;  ///< number of rows for patches, which are not used
+  /// [row]: the patches whose shifts AreTomo calls good; empty without a local alignment.
+  std::vector<std::vector<AreTomoPatch>> patches;
 };
 
-/// Reads an .aln file. Rows of local alignments are counted and skipped. Throws Error with the
+/// Reads an .aln file. Throws Error with the
 /// column for a number that cannot be; without `needs_tilt` such a tilt is 0, because another file
 /// has the tilts.
 AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path, bool needs_tilt = true);

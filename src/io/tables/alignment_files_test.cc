@@ -194,7 +194,7 @@ TEST(AreTomoAlignment, ReadsHeaderGlobalAndLocalRows) {
 # BetaOffset =     0.25
 # Thickness = 1240
 # SEC     ROT         GMAG       TX          TY      SMEAN     SFIT    SCALE     BASE     TILT
-)" + aln_row(0) + aln_row(2) + "# Local Alignment\n0 0 1.0 2.0 0.1 0.2 1.0\n1 0 1 2 0 0 1\n");
+)" + aln_row(0) + aln_row(2) + "# Local Alignment\n0 0 1.0 2.0 0.1 0.2 1.0\n1 0 1 2 nan 0 0\n");
   const AreTomoAlignment alignment = read_aretomo_alignment(path);
   EXPECT_EQ(*alignment.raw_size, (std::array<std::int64_t, 3>{64, 48, 3}));
   EXPECT_EQ(alignment.dark_sections, Sections{1});
@@ -208,7 +208,11 @@ TEST(AreTomoAlignment, ReadsHeaderGlobalAndLocalRows) {
   EXPECT_EQ(alignment.rows[1].shift_x_px, 3.5);
   EXPECT_EQ(alignment.rows[1].shift_y_px, -2.25);
   EXPECT_EQ(alignment.rows[1].tilt_deg, 0.0);
-  EXPECT_EQ(alignment.num_local_rows, 2);
+  ASSERT_EQ(alignment.patches.size(), 2u);
+  ASSERT_EQ(alignment.patches[0].size(), 1u);
+  EXPECT_EQ(alignment.patches[0][0].y_px, 2.0);
+  EXPECT_EQ(alignment.patches[0][0].shift_x_px, 0.1);
+  EXPECT_TRUE(alignment.patches[1].empty());  // AreTomo calls it bad
 }
 
 TEST(AreTomoAlignment, RefusesMalformedRows) {

@@ -98,6 +98,31 @@ AreTomoRow parse_row(const std::filesystem::path& path, const TextLine& line, bo
   return {*section, line.number, used[0], used[1], used[2], used[3], used[4]};
 }
 
+// Adds a row "t p x y dx dy good" of the local alignment, where t counts the rows of the global
+// one.
+void add_patch(const std::filesystem::path& path, const TextLine& line,
+               AreTomoAlignment& alignment) {
+  constexpr std::size_t kColumns = 7;
+  const auto words = split_words(line.text);
+  const auto row = words.size() == kColumns ? parse_integer(words[0]) : std::nullopt;
+  if (!row || *row < 0 || *row >= std::ssize(alignment.rows))
+    throw_row_error(
+        path, line,
+        fmt::format("a row of AreTomo's local alignment of {} views: t p x y dx dy good",
+                    alignment.rows.size()));
+  alignment.patches.resize(alignment.rows.size());
+  const auto good = parse_number(words[6]);
+  if (!good || *good < 0.9) return;  // as AreTomo does; such a row may have nan
+  std::array<double, 4> numbers{};
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto number = parse_number(words[2 + i], base::kLargestPosition_px);
+    if (!number) throw_row_error(path, line, "a row of AreTomo's local alignment");
+    numbers[i] = *number;
+  }
+  alignment.patches[static_cast<std::size_t>(*row)].push_back(
+      {numbers[0], numbers[1], numbers[2], numbers[3]});
+}
+
 }  // namespace
 
 AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path, bool needs_tilt) {
@@ -108,7 +133,7 @@ AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path, bool 
       is_local_part = is_local_part || line.text.find("Local Alignment") != std::string::npos;
       parse_header_line(path, line, &alignment);
     } else if (is_local_part) {
-      ++alignment.num_local_rows;
+      add_patch(path, line, alignment);
     } else {
       alignment.rows.push_back(parse_row(path, line, needs_tilt));
     }

@@ -161,7 +161,7 @@ TEST(ViewTable, ReadsXmlInUtf16) {
   EXPECT_EQ(read_view_table(scratch.write("TS.xml", utf16)).views[0].tilt_deg, 61.0);
 }
 
-TEST(ViewTable, SubtractsRigidMovementsOfWarpAndNamesOthers) {
+TEST(ViewTable, SubtractsTheMeanMovementOfWarpAndNamesTheRest) {
   const ScratchDirectory scratch;
   const std::string rigid =
       grid("GridMovementX", "Width=\"1\" Height=\"1\" Depth=\"2\"",
@@ -172,14 +172,16 @@ TEST(ViewTable, SubtractsRigidMovementsOfWarpAndNamesOthers) {
   EXPECT_DOUBLE_EQ(moved.views[0].shift_x_A, 270.8);
   EXPECT_DOUBLE_EQ(moved.views[1].shift_x_A, -1.0);
   EXPECT_DOUBLE_EQ(moved.views[1].shift_y_A, 1.5);
+  // Outer nodes lie on the edges of a view, so they count half: (1 / 2 + 4 + 3 / 2) / 2.
   const std::string local =
-      grid("GridMovementX", "Width=\"2\" Height=\"1\" Depth=\"1\"",
-           "<Node X=\"0\" Z=\"0\" Value=\"1\"/><Node X=\"1\" Z=\"0\" Value=\"2\"/>") +
+      grid("GridMovementX", "Width=\"3\" Height=\"1\" Depth=\"1\"",
+           "<Node X=\"0\" Z=\"0\" Value=\"1\"/><Node X=\"1\" Z=\"0\" Value=\"4\"/>"
+           "<Node X=\"2\" Z=\"0\" Value=\"3\"/>") +
       grid("GridVolumeWarpZ", "Width=\"1\"", "<Node Value=\"3\"/>");
   const auto left = read_view_table(scratch.write("b.xml", kSeriesXml + local + "</TiltSeries>"));
-  EXPECT_DOUBLE_EQ(left.views[0].shift_x_A, 271.8);
+  EXPECT_DOUBLE_EQ(left.views[0].shift_x_A, 271.8 - 3.0);
   ASSERT_EQ(left.not_applied.size(), 2u);
-  expect_parts(left.not_applied[0], {"GridMovementX"});
+  expect_parts(left.not_applied[0], {"GridMovementX", "mean", "by up to 2 Å"});
   expect_parts(left.not_applied[1], {"GridVolumeWarpZ"});
 }
 

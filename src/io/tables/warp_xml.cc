@@ -1,7 +1,12 @@
 #include <fmt/format.h>
 
-#include <array>
+#include <algorithm>
+#include <cmath>
+#include <optional>
 #include <pugixml.hpp>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "io/tables/text_lines.h"
 #include "io/tables/view_table.h"
@@ -85,11 +90,36 @@ class WarpXml {
     return size_A > 0 ? std::optional(size_A) : std::nullopt;
   }
 
-  // Returns a shift of each view from a grid of movements. Nothing if the grid varies within a
-  // view or has some other number of views.
-  std::optional<std::vector<double>> shifts_of_grid(const char* name, std::size_t num_views) const {
-    if (is_zero(name)) return std::vector<double>(num_views, 0.0);
-    return values_of_grid(name, num_views);
+  // The movements along an axis: the mean of each view, and the largest distance of a node from it.
+  struct Movements {
+    std::vector<double> means;
+    double largest_rest = 0.0;
+  };
+
+  // Returns the movements of a grid, whose outer nodes lie on the edges of the views. Nothing if it
+  // has some other number of views.
+  std::optional<Movements> movements_of_grid(const char* name, std::size_t num_views) const {
+    if (is_zero(name)) return Movements{std::vector<double>(num_views, 0.0)};
+    const auto depth =
+        static_cast<std::size_t>(std::max(root_.child(name).attribute("Depth").as_int(1), 0));
+    if (depth != 1 && depth != num_views) return std::nullopt;
+    const std::vector<GridNode> nodes = nodes_of_grid(name);
+    std::vector<double> sums(depth), weights(depth);
+    for (const GridNode& node : nodes) {
+      sums[node.layer] += node.weight * node.value;
+      weights[node.layer] += node.weight;
+    }
+    if (std::ranges::any_of(weights, [](double weight) { return !(weight > 0.0); }))
+      return std::nullopt;
+    Movements found;
+    for (std::size_t view = 0; view < num_views; ++view) {
+      const std::size_t layer = depth == 1 ? 0 : view;
+      found.means.push_back(sums[layer] / weights[layer]);
+    }
+    for (const GridNode& node : nodes)
+      found.largest_rest = std::max(found.largest_rest,
+                                    std::fabs(node.value - sums[node.layer] / weights[node.layer]));
+    return found;
   }
 
   // Returns a value of each view from a grid. Nothing if there is no such grid, or if it varies
@@ -122,6 +152,36 @@ class WarpXml {
   bool is_zero(const char* grid) const { return is_zero_grid(root_.child(grid)); }
 
  private:
+  // A node of a grid: its layer, its value, and its share in the mean of the layer.
+  struct GridNode {
+    std::size_t layer;
+    double value, weight;
+  };
+
+  std::vector<GridNode> nodes_of_grid(const char* name) const {
+    const pugi::xml_node grid = root_.child(name);
+    std::vector<GridNode> nodes;
+    for (const pugi::xml_node node : grid.children("Node")) {
+      const auto place = [&](const char* axis, const char* side) {
+        const int count = grid.attribute(side).as_int(1);
+        const auto index = parse_integer(node.attribute(axis).value()).value_or(0);
+        if (index >= 0 && index < count) return std::pair{static_cast<int>(index), count};
+        throw Error(fmt::format("'{}': a node of {} has {} {}, and there are {}", path_.string(),
+                                name, axis, index, count));
+      };
+      const double value = parse(name, node.attribute("Value").value(), base::kLargestPosition_px);
+      nodes.push_back({static_cast<std::size_t>(place("Z", "Depth").first), value,
+                       weight_of_node(place("X", "Width")) * weight_of_node(place("Y", "Height"))});
+    }
+    return nodes;
+  }
+
+  // Returns the share of a node in the mean along a side: outer nodes count half.
+  static double weight_of_node(const std::pair<int, int>& place) {
+    const auto [index, count] = place;
+    return count > 1 && (index == 0 || index == count - 1) ? 0.5 : 1.0;
+  }
+
   double parse(const char* name, std::string_view text, double largest) const {
     if (const auto value = parse_number(trim(text), largest)) return *value;
     throw Error(fmt::format("'{}': '{}' in {} is not a number from -{} to {}", path_.string(),
@@ -140,18 +200,27 @@ class WarpXml {
   pugi::xml_node root_;
 };
 
-// Subtracts the shifts that Warp refined beside the offsets of the axis, as Warp does.
+// Subtracts the shifts that Warp refined beside the offsets of the axis, as Warp does: the mean of
+// each view.
 void apply_movements(const WarpXml& xml, ViewTable& table) {
-  const auto shifts_x = xml.shifts_of_grid("GridMovementX", table.views.size());
-  const auto shifts_y = xml.shifts_of_grid("GridMovementY", table.views.size());
-  if (!shifts_x || !shifts_y) {
+  const auto along_x = xml.movements_of_grid("GridMovementX", table.views.size());
+  const auto along_y = xml.movements_of_grid("GridMovementY", table.views.size());
+  if (!along_x || !along_y) {
     table.not_applied.emplace_back(
-        "GridMovementX and GridMovementY, local shifts within the views");
+        fmt::format("GridMovementX and GridMovementY are not applied: they are not of {} views",
+                    table.views.size()));
     return;
   }
   for (std::size_t i = 0; i < table.views.size(); ++i) {
-    table.views[i].shift_x_A -= (*shifts_x)[i];
-    table.views[i].shift_y_A -= (*shifts_y)[i];
+    table.views[i].shift_x_A -= along_x->means[i];
+    table.views[i].shift_y_A -= along_y->means[i];
+  }
+  const double rest_A = std::max(along_x->largest_rest, along_y->largest_rest);
+  if (rest_A > 0.0) {
+    table.not_applied.emplace_back(
+        fmt::format("of GridMovementX and GridMovementY the mean of each view is applied; what "
+                    "varies within the views, by up to {:.3g} Å, is not",
+                    rest_A));
   }
 }
 

@@ -1,0 +1,161 @@
+#include "exchange/particles/particle_list.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "base/plausible.h"
+#include "io/tables/fiducial_points.h"
+#include "output/volume_frame.h"
+#include "tomofield/error.h"
+
+namespace tomofield::exchange {
+namespace {
+
+namespace fs = std::filesystem;
+using field::Point;
+
+constexpr const char* kTomogramName = "rlnTomoName";
+constexpr const char* kOpticsGroup = "rlnOpticsGroup";
+constexpr const char* kSeriesPixel = "rlnTomoTiltSeriesPixelSize";
+constexpr std::array kCoordinates{"rlnCenteredCoordinateXAngst", "rlnCenteredCoordinateYAngst",
+                                  "rlnCenteredCoordinateZAngst"};
+constexpr std::array kAngles{"rlnAngleRot", "rlnAngleTilt", "rlnAnglePsi"};
+constexpr std::array kSubtomogramAngles{"rlnTomoSubtomogramRot", "rlnTomoSubtomogramTilt",
+                                        "rlnTomoSubtomogramPsi"};
+
+// RELION counts from a point that is half an unbinned pixel above the middle of our volume.
+constexpr double kCentre_px = 0.5;
+
+/// Returns the size of an unbinned pixel of the series, as far as the options of the run tell.
+double unbinned_pixel_A(const output::ModelInfo& model) {
+  const auto options = nlohmann::json::parse(model.options_json, nullptr, false);
+  if (!options.is_object()) return model.pixel_size_A;
+  const nlohmann::json bin =
+      options.value("input", nlohmann::json::object()).value("bin", nlohmann::json());
+  return model.pixel_size_A / (bin.is_number() ? std::max(bin.get<double>(), 1.0) : 1.0);
+}
+
+// ------------------------------------------------------------------ RELION
+
+/// Returns the rows of the tomogram.
+std::vector<std::size_t> rows_of_tomogram(const fs::path& path, const io::StarTable& table,
+                                          const fs::path& model_file, const std::string& tomogram) {
+  std::vector<std::size_t> rows;
+  std::set<std::string> names;
+  for (std::size_t row = 0; row < table.num_rows(); ++row)
+    names.insert(table.find(row, kTomogramName).value_or(""));
+  const bool is_only = names.size() == 1 && tomogram.empty();
+  const std::string wanted = tomogram.empty() ? model_file.stem().string() : tomogram;
+  for (std::size_t row = 0; row < table.num_rows(); ++row)
+    if (is_only || table.find(row, kTomogramName).value_or("") == wanted) rows.push_back(row);
+  if (!rows.empty()) return rows;
+  if (names.empty()) throw Error(fmt::format("'{}' has no particles", path.string()));
+  std::string first = "'" + *names.begin() + "'";
+  if (names.size() > 1) first += fmt::format(" to '{}'", *names.rbegin());
+  throw Error(
+      fmt::format("'{}' has particles of {} tomogram{} ({}), and none of '{}': name one "
+                  "with --tomogram",
+                  path.string(), names.size(), names.size() == 1 ? "" : "s", first, wanted));
+}
+
+/// Returns the pixel size of the tilt series from which a particle comes.
+std::optional<double> series_pixel_A(const fs::path& path, const io::StarTable& optics,
+                                     const std::optional<std::string>& group) {
+  for (std::size_t row = 0; row < optics.num_rows(); ++row) {
+    if (group && optics.num_rows() > 1 && optics.find(row, kOpticsGroup) != group) continue;
+    const auto size_A = io::StarRow(path, optics, row).find_number(kSeriesPixel);
+    if (!size_A || base::is_plausible_pixel_size(*size_A)) return size_A;
+    throw Error(fmt::format("'{}': _{} is {} Å, and pixels have {} to {} Å", path.string(),
+                            kSeriesPixel, *size_A, base::kSmallestPixel_A, base::kLargestPixel_A));
+  }
+  return std::nullopt;
+}
+
+/// Returns three angles of a row, or nothing without their columns.
+std::optional<Point> angles_of(const io::StarRow& row, const std::array<const char*, 3>& columns) {
+  const auto rot = row.find_number(columns[0]), tilt = row.find_number(columns[1]),
+             psi = row.find_number(columns[2]);
+  if (!rot || !tilt || !psi) return std::nullopt;
+  return Point{*rot, *tilt, *psi};
+}
+
+Particle relion_particle(const io::StarRow& row, const output::ModelInfo& model,
+                         double unbinned_A) {
+  constexpr double kLargest_A = 1e8;
+  Particle particle{.place_px = output::VolumeFrame(model).centre()};
+  for (std::size_t a = 0; a < 3; ++a)
+    particle.place_px[a] +=
+        (row.number(kCoordinates[a], kLargest_A) + kCentre_px * unbinned_A) / model.pixel_size_A;
+  if (const auto angles = angles_of(row, kSubtomogramAngles))
+    particle.volume_from_box = field::rotation_from_euler((*angles)[0], (*angles)[1], (*angles)[2]);
+  return particle;
+}
+
+ParticleList read_relion(const fs::path& path, const fs::path& model_file,
+                         const output::ModelInfo& model, const std::string& tomogram) {
+  const std::vector<io::StarTable> tables = io::read_star_file(path);
+  const io::StarTable* const all = io::find_table(tables, kCoordinates[0]);
+  if (all == nullptr) {
+    throw Error(fmt::format("'{}' has no column _{}, which the particles of RELION 5 have{}",
+                            path.string(), kCoordinates[0],
+                            io::find_table(tables, "rlnCoordinateX") != nullptr
+                                ? ": its _rlnCoordinateX is of RELION 4; import the particles into "
+                                  "RELION 5, or give their voxels as the text of model2point"
+                                : ""));
+  }
+  ParticleList list;
+  list.table = all->only(rows_of_tomogram(path, *all, model_file, tomogram));
+  if (const auto optics = std::ranges::find(tables, "optics", &io::StarTable::name);
+      optics != tables.end())
+    list.optics = *optics;
+  for (std::size_t row = 0; row < list.table.num_rows(); ++row) {
+    const auto unbinned_A = series_pixel_A(path, list.optics, list.table.find(row, kOpticsGroup));
+    list.particles.push_back(relion_particle(io::StarRow(path, list.table, row), model,
+                                             unbinned_A.value_or(unbinned_pixel_A(model))));
+  }
+  return list;
+}
+
+// -------------------------------------------------------------------- IMOD
+
+ParticleList read_points(const fs::path& path, const fs::path& model_file,
+                         const output::ModelInfo& model, const std::string& tomogram) {
+  const std::string name = tomogram.empty() ? model_file.stem().string() : tomogram;
+  const double unbinned_A = unbinned_pixel_A(model);
+  const Point centre = output::VolumeFrame(model).centre();
+  std::vector<std::string> columns{kTomogramName};
+  columns.insert(columns.end(), kCoordinates.begin(), kCoordinates.end());
+  columns.insert(columns.end(), kAngles.begin(), kAngles.end());
+  columns.push_back(kOpticsGroup);
+  ParticleList list;
+  list.optics = {"optics", {kOpticsGroup, "rlnOpticsGroupName", kSeriesPixel}};
+  list.optics.add_row({"1", name, fmt::format("{:.6f}", unbinned_A)});
+  list.table = {"particles", columns};
+  for (const io::FiducialPoint& point : io::read_fiducial_points(path)) {
+    const Point place{static_cast<double>(model.roi.x0) + point.x_px,
+                      static_cast<double>(model.roi.y0) + point.y_px, point.section + 0.5};
+    std::vector<std::string> row{name};
+    for (std::size_t a = 0; a < 3; ++a)
+      row.push_back(fmt::format(
+          "{:.4f}", (place[a] - centre[a]) * model.pixel_size_A - kCentre_px * unbinned_A));
+    row.insert(row.end(), {"0.0", "0.0", "0.0", "1"});
+    list.table.add_row(std::move(row));
+    list.particles.push_back({.place_px = place});
+  }
+  return list;
+}
+
+}  // namespace
+
+ParticleList read_particle_list(const fs::path& path, const fs::path& model_file,
+                                const output::ModelInfo& model, const std::string& tomogram) {
+  return path.extension() == ".star" ? read_relion(path, model_file, model, tomogram)
+                                     : read_points(path, model_file, model, tomogram);
+}
+
+}  // namespace tomofield::exchange

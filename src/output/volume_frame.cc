@@ -1,0 +1,62 @@
+#include "output/volume_frame.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace tomofield::output {
+namespace {
+
+using field::Point;
+using field::Rotation;
+
+Point turned(const Rotation& rotation, const Point& p) {
+  Point result{};
+  for (std::size_t a = 0; a < 3; ++a)
+    result[a] = rotation[a][0] * p[0] + rotation[a][1] * p[1] + rotation[a][2] * p[2];
+  return result;
+}
+
+Rotation product(const Rotation& a, const Rotation& b) {
+  Rotation result{};
+  for (std::size_t row = 0; row < 3; ++row)
+    for (std::size_t column = 0; column < 3; ++column)
+      for (std::size_t k = 0; k < 3; ++k) result[row][column] += a[row][k] * b[k][column];
+  return result;
+}
+
+// Returns D Ry(pitch) Rx(alpha) D. A mirrored Z turns the other way.
+Rotation rotation(double pitch_deg, double alpha_deg, int hand) {
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  const double p = hand * pitch_deg * kDegree, a = hand * alpha_deg * kDegree;
+  const Rotation about_y{
+      {{std::cos(p), 0, std::sin(p)}, {0, 1, 0}, {-std::sin(p), 0, std::cos(p)}}};
+  const Rotation about_x{
+      {{1, 0, 0}, {0, std::cos(a), -std::sin(a)}, {0, std::sin(a), std::cos(a)}}};
+  return product(about_y, about_x);
+}
+
+}  // namespace
+
+VolumeFrame::VolumeFrame(const ModelInfo& model, const Levelling& levelling)
+    : centre_{model.geometry.axis_x, static_cast<double>(model.geometry.height) / 2,
+              model.geometry.axis_z},
+      field_from_volume_(rotation(levelling.pitch_deg, model.x_tilt_deg - levelling.x_tilt_deg,
+                                  model.geometry.hand)) {}
+
+Point VolumeFrame::to_field(const Point& point) const {
+  Point from_centre{};
+  for (std::size_t a = 0; a < 3; ++a) from_centre[a] = point[a] - centre_[a];
+  Point at = turned(field_from_volume_, from_centre);
+  for (std::size_t a = 0; a < 3; ++a) at[a] += centre_[a];
+  return at;
+}
+
+field::OrientedBox VolumeFrame::to_field(const field::OrientedBox& box) const {
+  if (field_from_volume_ == field::kNoRotation) return box;
+  field::OrientedBox turned_box = box;
+  turned_box.centre_px = to_field(box.centre_px);
+  turned_box.field_from_box = product(field_from_volume_, box.field_from_box);
+  return turned_box;
+}
+
+}  // namespace tomofield::output

@@ -1,0 +1,35 @@
+#pragma once
+
+#include "field/sampling/sample_box.h"
+#include "output/model_file.h"
+
+namespace tomofield::output {
+
+/// The angles that bring a specimen level, as options of a reconstruction would
+/// (`--tilt-offset`, `--x-axis-tilt`).
+struct Levelling {
+  double pitch_deg = 0.0;   ///< is added to all tilt angles
+  double x_tilt_deg = 0.0;  ///< is subtracted from the x-axis tilts of all views
+};
+
+/// The place of a volume in the field of a model. A point P of the volume lies in the field at
+///
+///   C + D Ry(pitch) Rx(alpha - x_tilt) D (P − C),    D = diag(1, 1, hand)
+///
+/// where C is the point about which specimens are tilted and alpha is the x-axis tilt of the model
+/// (docs/geometry.md). Lengths are pixels; pixel i covers [i, i + 1).
+class VolumeFrame {
+ public:
+  explicit VolumeFrame(const ModelInfo& model, const Levelling& levelling = {});
+
+  const field::Point& centre() const { return centre_; }
+  field::Point to_field(const field::Point& point) const;
+  /// Returns where a box of the volume lies in the field.
+  field::OrientedBox to_field(const field::OrientedBox& box) const;
+
+ private:
+  field::Point centre_;
+  field::Rotation field_from_volume_;
+};
+
+}  // namespace tomofield::output
