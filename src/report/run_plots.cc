@@ -29,7 +29,7 @@ bool has_points(const Curve& curve) {
 }
 
 // Draws the curves that have points.
-std::string plot(const PlotAxes& axes, std::vector<Curve> curves) {
+base::Html plot(const PlotAxes& axes, std::vector<Curve> curves) {
   std::erase_if(curves, [](const Curve& curve) { return !has_points(curve); });
   return curves.empty() ? "" : curve_plot_svg(axes, curves);
 }
@@ -73,7 +73,7 @@ Curve with_marks(Curve curve) {
 
 }  // namespace
 
-std::string loss_plot(const AllFits& fits) {
+base::Html loss_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const FitMetrics& fit : fits) {
     curves.push_back(epoch_curve(name_of("fitted views", fit),
@@ -90,14 +90,14 @@ std::string loss_plot(const AllFits& fits) {
               curves);
 }
 
-std::string trials_plot(const json& metrics) {
+base::Html trials_plot(const json& metrics) {
   const json& tuning = member(metrics, "tuning");
   if (!tuning.is_object()) return "";
   const CurvePlot choice = choice_plot(tune::tuned_from(tuning));
   return curve_plot_svg(choice.axes, choice.curves);
 }
 
-std::string residual_plot(const AllFits& fits) {
+base::Html residual_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const FitMetrics& fit : fits) {
     curves.push_back(
@@ -113,7 +113,7 @@ std::string residual_plot(const AllFits& fits) {
               curves);
 }
 
-std::string scale_plot(const AllFits& fits) {
+base::Html scale_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const FitMetrics& fit : fits) {
     const json& views = member(fit.metrics, "views");
@@ -124,7 +124,7 @@ std::string scale_plot(const AllFits& fits) {
               curves);
 }
 
-std::string offset_plot(const AllFits& fits) {
+base::Html offset_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const FitMetrics& fit : fits) {
     const json& views = member(fit.metrics, "views");
@@ -137,7 +137,7 @@ std::string offset_plot(const AllFits& fits) {
               curves);
 }
 
-std::string displacement_plot(const AllFits& fits) {
+base::Html displacement_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const FitMetrics& fit : fits) {
     const json& compared = member(member(member(fit.metrics, "verdict"), "views"), "compared");
@@ -159,7 +159,7 @@ std::string displacement_plot(const AllFits& fits) {
               curves);
 }
 
-std::string masked_plot(const AllFits& fits) {
+base::Html masked_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const FitMetrics& fit : fits) {
     const json& mask = member(fit.metrics, "mask");
@@ -173,7 +173,7 @@ std::string masked_plot(const AllFits& fits) {
               curves);
 }
 
-std::string halves_plot(const json& fsc) {
+base::Html halves_plot(const json& fsc) {
   if (!fsc.is_object() || !fsc.contains("frequency_per_A")) return "";
   std::vector<double> frequencies;
   for (const json& frequency : fsc["frequency_per_A"])
@@ -193,7 +193,7 @@ std::string halves_plot(const json& fsc) {
   return plot(fsc_axes(frequencies.back()), curves);
 }
 
-std::string histogram_plot(const std::vector<float>& voxels) {
+base::Html histogram_plot(const std::vector<float>& voxels) {
   constexpr int kBins = 120;
   if (voxels.empty()) return "";
   const double black = base::percentile(voxels, 0.5), white = base::percentile(voxels, 99.5);

@@ -262,7 +262,7 @@ void add_pictures(const ReportSource& source, const AllFits& fits, HtmlPage& pag
   page.add_heading("Masks");
   page.add_paragraph(mask_text(metrics.at("mask")));
   page.add_figures({{source.pictures.mask, "The view of lowest tilt"}}, FigureSize::kLarge);
-  if (const std::string plot = masked_plot(fits); !plot.empty()) page.add_svg(plot);
+  if (const base::Html plot = masked_plot(fits); !plot.empty()) page.add_svg(plot);
   if (!source.pictures.tree) return;
   page.add_heading("Tree");
   page.add_paragraph(
@@ -274,7 +274,7 @@ void add_pictures(const ReportSource& source, const AllFits& fits, HtmlPage& pag
 }
 
 // Adds a plot with its heading and explanation, if there is one.
-void add_plot(const char* heading, const char* text, const std::string& svg, HtmlPage& page) {
+void add_plot(const char* heading, const char* text, const base::Html& svg, HtmlPage& page) {
   if (svg.empty()) return;
   page.add_heading(heading);
   page.add_svg(svg, text);
