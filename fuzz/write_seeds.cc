@@ -10,9 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "alignment_seed.h"
 #include "base/threads/parallel.h"
 #include "checkpoint/checkpoint.h"
 #include "compact/compress.h"
+#include "geometry/view_warp.h"
 #include "io/images/mrc.h"
 #include "small_fit.h"
 #include "tune/trial_file.h"
@@ -190,15 +192,63 @@ void write_series(const fs::path& folder, const std::string& stack) {
   write(folder / "mask", head + part(1, kAngles) + part(7, stack));
 }
 
-void write_trials(const fs::path& folder) {
+// Writes trials and their tuning to `folder`, and what a batch makes of them to `batch`.
+void write_trials(const fs::path& folder, const fs::path& batch) {
   using namespace tune;
   const TrialSettings settings{Penalty::kSmooth, 5, 12, 30};
   const tune::HeldOutScore score{1.25, {1.0, 1.5}};
   const nlohmann::json trial = tune::trial_json(settings_json(settings), score, 2.5);
   write(folder / "file", nlohmann::json{{"fingerprint", "{}"}, {"trials", {trial, trial}}}.dump());
+  const nlohmann::json chosen = settings_json(settings);
+  write(batch / "vote", nlohmann::json{{"chosen", chosen}}.dump());
+  nlohmann::json choice = chosen, vote = chosen;
+  vote["series"] = "a";
+  choice["votes"] = {vote, {{"series", "b"}, {"failure", "no memory"}}};
+  write(batch / "choice", choice.dump());
   const TunedFit tuned{
       .settings = settings, .trials = {{settings, score, 2.5}}, .predicted_views = {3, 9}};
   write(folder / "tuning", tuning_json(tuned).dump());
+}
+
+// Writes a record as realign::alignment_record() does: plain, and with beads, a pose and local
+// motion.
+void write_alignments(const fs::path& folder) {
+  nlohmann::json views = nlohmann::json::array();
+  for (int section = 1; section <= 3; ++section)
+    views.push_back({{"section", section},
+                     {"tilt_deg", 20 * section - 40},
+                     {"shift_px", {1.5, -2}},
+                     {"rotation_deg", 0.25},
+                     {"log_magnification", 0.01},
+                     {"tilt_change_deg", 0.5},
+                     {"correlation", 0.9},
+                     {"shift_error_px", {0.1, 0.2}},
+                     {"left_out", section == 2}});
+  const nlohmann::json gain{{"held_out_error", {{"before", 0.5}, {"after", 0.4}}},
+                            {"gain", {{"mean", 0.1}, {"standard_error", 0.01}}}};
+  nlohmann::json record = fuzz::alignment_origin();
+  record.update(gain);
+  record.update({{"accepted", true},
+                 {"rotation", true},
+                 {"magnification", true},
+                 {"tilt", true},
+                 {"steps_px", {1.0, 0.1}},
+                 {"seconds", 1.5},
+                 {"views", views}});
+  write(folder / "plain", record.dump());
+  record["pose"] = {{"pitch_deg", 1.0},
+                    {"pitch_error_deg", 0.1},
+                    {"thickness_px", 20},
+                    {"thickness_error_px", 2}};
+  record["beads"] = {{"beads", 5},
+                     {"distance_px", {{"files", 2.0}, {"before", 2.0}, {"after", 0.3}}},
+                     {"gain", gain["gain"]},
+                     {"accepted", true}};
+  record["local"] = gain;
+  record["local"].update(
+      {{"accepted", true}, {"steps_px", {0.1}}, {"size_px", {24, 20}}, {"rms_px", 0.2}});
+  for (nlohmann::json& view : record["views"]) view["local_px"] = geometry::ViewWarp{}.rows();
+  write(folder / "whole", record.dump());
 }
 
 // Writes the tiles of a run as checkpoint::FinishedTiles does.
@@ -280,7 +330,8 @@ int main(int argc, char** argv) {
   };
   for (const Seed& seed : seeds) write(folder / seed.reader / seed.name, seed.text);
   write_tiffs(folder / "tiff");
-  write_trials(folder / "trials");
+  write_trials(folder / "trials", folder / "batch");
+  write_alignments(folder / "alignment");
   for (const io::MrcMode mode : {io::MrcMode::kInt8, io::MrcMode::kInt16, io::MrcMode::kUint16,
                                  io::MrcMode::kFloat16, io::MrcMode::kFloat32})
     write_stack(folder / "mrc" / std::to_string(static_cast<int>(mode)), mode);
