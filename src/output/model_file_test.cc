@@ -296,6 +296,7 @@ TEST(ModelFile, RefusesWhatIsConsistentHdf5ButNoSoundModel) {
   const std::vector<Damage> damages = {
       {"", ""},  // the editor itself does no harm
       {"f['field/parameters'][3] = float('nan')", "parameter 3"},
+      {"f['field/parameters'][3] = 1e10", "parameter 3"},
       {"del f['field/parameters']", "parameters"},
       {"p = f['field/parameters'][:-1]; del f['field/parameters']; f['field/parameters'] = p",
        "elements"},
