@@ -10,10 +10,12 @@
 #include <string>
 #include <vector>
 
+#include "alignment_seed.h"
 #include "base/threads/parallel.h"
 #include "checkpoint/checkpoint.h"
 #include "checkpoint/tile_record.h"
 #include "compact/compress.h"
+#include "geometry/view_warp.h"
 #include "io/images/mrc.h"
 #include "small_fit.h"
 #include "tune/trial_record.h"
@@ -190,15 +192,58 @@ void write_series(const fs::path& folder, const std::string& stack) {
   write(folder / "mask", head + part(1, kAngles) + part(7, stack));
 }
 
-void write_trials(const fs::path& folder) {
+// Writes trials and their tuning to `folder`, and what a batch makes of them to `batch`.
+void write_trials(const fs::path& folder, const fs::path& batch) {
   using namespace tune;
   const TrialSettings settings{Penalty::kSmooth, 5, 12, 30};
   const tune::HeldOutScore score{1.25, {1.0, 1.5}};
   const nlohmann::json trial = tune::to_json(tune::FitTrial{settings, score, 2.5});
   write(folder / "file", nlohmann::json{{"fingerprint", "{}"}, {"trials", {trial, trial}}}.dump());
+  const nlohmann::json chosen = settings_json(settings);
+  write(batch / "vote", nlohmann::json{{"chosen", chosen}}.dump());
+  nlohmann::json choice = chosen, vote = chosen;
+  vote["series"] = "a";
+  choice["votes"] = {vote, {{"series", "b"}, {"failure", "no memory"}}};
+  write(batch / "choice", choice.dump());
   const TunedFit tuned{
       .settings = settings, .trials = {{settings, score, 2.5}}, .predicted_views = {3, 9}};
   write(folder / "tuning", tuning_json(tuned).dump());
+}
+
+// Writes records of an alignment: plain, and with beads, a pose and local motion.
+void write_alignments(const fs::path& folder) {
+  using namespace alignment;
+  const Comparison held_out{.before = 0.5, .after = 0.4, .gain = {.mean = 0.1, .error = 0.01}};
+  AlignmentRecord record{.origin = fuzz::alignment_origin(),
+                         .is_accepted = true,
+                         .freedoms = {.rotation = true, .magnification = true, .tilt = true},
+                         .held_out = held_out,
+                         .steps_px = {1.0, 0.1},
+                         .seconds = 1.5};
+  for (int section = 0; section < 3; ++section)
+    record.views.push_back({.section = section,
+                            .tilt_deg = 20.0 * section - 20,
+                            .shift_px = {1.5, -2},
+                            .rotation_deg = 0.25,
+                            .log_magnification = 0.01,
+                            .tilt_change_deg = 0.5,
+                            .agreement = {.correlation = 0.9, .error_px = {0.1, 0.2}},
+                            .is_left_out = section == 1});
+  write(folder / "plain", to_json(record).dump());
+  record.pose = {.pose = {.thickness_px = 20, .pitch_deg = 1, .x_tilt_deg = 0.5},
+                 .error = {.thickness_px = 2, .pitch_deg = 0.1, .x_tilt_deg = 0.1}};
+  record.beads = {.num_beads = 5,
+                  .files_px = 2,
+                  .before_px = 2,
+                  .after_px = 0.3,
+                  .gain = held_out.gain,
+                  .is_accepted = true};
+  record.local = {.trial = {.held_out = held_out, .steps_px = {0.1}, .is_accepted = true},
+                  .size_px = {24, 20},
+                  .rms_px = 0.2};
+  for (AlignedView& view : record.views)
+    view.local = geometry::ViewWarp{.width_px = 24, .height_px = 20};
+  write(folder / "whole", to_json(record).dump());
 }
 
 // Writes the tiles of a run as checkpoint::FinishedTiles does.
@@ -286,7 +331,8 @@ int main(int argc, char** argv) {
   };
   for (const Seed& seed : seeds) write(folder / seed.reader / seed.name, seed.text);
   write_tiffs(folder / "tiff");
-  write_trials(folder / "trials");
+  write_trials(folder / "trials", folder / "batch");
+  write_alignments(folder / "alignment");
   for (const io::MrcMode mode : {io::MrcMode::kInt8, io::MrcMode::kInt16, io::MrcMode::kUint16,
                                  io::MrcMode::kFloat16, io::MrcMode::kFloat32})
     write_stack(folder / "mrc" / std::to_string(static_cast<int>(mode)), mode);

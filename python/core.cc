@@ -43,7 +43,11 @@ Array<Number> numbers_of(const py::object& object) {
   if (std::string_view("biuf").find(array.dtype().kind()) == std::string_view::npos)
     throw Error("an array of real numbers is needed, not one of type " +
                 py::str(array.dtype()).cast<std::string>());
-  return Array<Number>::ensure(array);
+  const auto numbers = Array<Number>::ensure(array);
+  if (!numbers)  // NumPy raised, as it was told to (np.seterr, python -W error)
+    throw Error("an array of type " + py::str(array.dtype()).cast<std::string>() +
+                " has numbers that are too large");
+  return numbers;
 }
 
 // Hands a vector over to numpy without a copy.

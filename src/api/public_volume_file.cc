@@ -60,7 +60,8 @@ void write_mrc(const Tomogram& volume, const std::filesystem::path& path, bool o
   const auto [nx, ny, nz] = volume.size;
   if (!base::is_plausible_pixel_size(volume.voxel_size_A))
     throw Error(fmt::format("voxels of {} Å cannot be written: give their size, from {} to {} Å",
-                            volume.voxel_size_A, base::kSmallestPixel_A, base::kLargestPixel_A));
+                            volume.voxel_size_A, base::kPixelSizes_A.low(),
+                            base::kPixelSizes_A.high()));
   if (nx < 1 || ny < 1 || nz < 1 || std::ssize(volume.values) != nx * ny * nz)
     throw Error(fmt::format("{} values are not a volume of {} × {} × {} voxels",
                             volume.values.size(), nx, ny, nz));

@@ -131,8 +131,6 @@ void write_volume(const Solution& solution, const measurement::Measurement& seri
                path);
 }
 
-}
-
 // Prepares the views, and corrects their contrast transfer if the options have one.
 measurement::Measurement prepare(const tilt_series::TiltSeries& tilt_series,
                                  const BaselineOptions& options,

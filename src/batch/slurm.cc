@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "base/code_text.h"
 #include "base/system/child_process.h"
 #include "batch/packing.h"
 #include "batch/state.h"
@@ -30,19 +31,22 @@ std::optional<std::int64_t> number_in_environment(const char* name) {
   return number && *number > 0 ? number : std::nullopt;
 }
 
-// Returns a text as one word of the shell.
-std::string shell_word(const std::string& text) {
-  std::string word = "'";
-  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
-  return word + "'";
-}
+// The language of the script. A text from outside becomes one word of it.
+struct Shell {
+  static std::string quoted(std::string_view text) {
+    std::string word = "'";
+    for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
+    return word + "'";
+  }
+};
+using Script = base::CodeText<Shell>;
 
 // Returns the tasks of an array, counted from 1, as Slurm reads them: "1,3,4".
-std::string array_of(const std::vector<Job>& jobs) {
+Script array_of(const std::vector<Job>& jobs) {
   std::vector<std::size_t> numbers;
   for (const std::size_t job : largest_first(jobs)) numbers.push_back(job + 1);
   std::ranges::sort(numbers);
-  return fmt::format("{}", fmt::join(numbers, ","));
+  return Script::made(fmt::format("{}", fmt::join(numbers, ",")));
 }
 
 std::int64_t memory_MiB(const std::vector<Job>& jobs, int threads) {
@@ -60,13 +64,13 @@ double minutes(const std::vector<Job>& jobs, int threads) {
 
 // Returns a name in an option of sbatch, which knows no quotes and reads % as a pattern. A line end
 // in a name would be a command of the script.
-std::string name_for_sbatch(const fs::path& path) {
+Script name_for_sbatch(const fs::path& path) {
   const std::string name = path.string();
   const auto is_safe = [](unsigned char c) {
     return c > ' ' && c != 0x7f &&
            std::string_view("\"'\\%#").find(char(c)) == std::string_view::npos;
   };
-  if (std::ranges::all_of(name, is_safe)) return name;
+  if (std::ranges::all_of(name, is_safe)) return Script::made(name);
   throw Error(
       fmt::format("{} cannot be named in a script for sbatch: give -o a folder without "
                   "spaces, line ends, quotes, '%' and '#' in its path",
@@ -74,9 +78,9 @@ std::string name_for_sbatch(const fs::path& path) {
 }
 
 // Returns an option of the user for sbatch, which is one line of the script.
-std::string line_for_sbatch(const std::string& option) {
+Script line_for_sbatch(const std::string& option) {
   if (std::ranges::none_of(option, [](unsigned char c) { return c < ' ' || c == 0x7f; }))
-    return option;
+    return Script::made(option);
   throw Error(
       fmt::format("{} cannot be an option for sbatch: it has a line end or another "
                   "control character",
@@ -102,24 +106,24 @@ fs::path list_of(const fs::path& folder) { return folder / "batch.json"; }
 
 std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jobs) {
   const fs::path logs = fs::absolute(log_folder(options.folder));
-  std::string script = "#!/bin/sh\n";
+  Script script = "#!/bin/sh\n";
   // If an option comes twice, sbatch takes the last.
-  const auto add = [&](const std::string& option) { script += "#SBATCH " + option + "\n"; };
+  const auto add = [&](const Script& option) { script += Script::format("#SBATCH {}\n", option); };
+  const auto word = [](const fs::path& path) { return Script::of(path.string()); };
   add("--job-name=tomofield");
-  add(fmt::format("--cpus-per-task={}", options.threads));
-  add(fmt::format("--mem={}M", memory_MiB(jobs, options.threads)));
-  add(fmt::format("--time={:.0f}", minutes(jobs, options.threads)));
+  add(Script::format("--cpus-per-task={}", options.threads));
+  add(Script::format("--mem={}M", memory_MiB(jobs, options.threads)));
+  add(Script::format("--time={:.0f}", minutes(jobs, options.threads)));
   for (const std::string& option : options.more) add(line_for_sbatch(option));
-  add("--array=" + array_of(jobs));
+  add(Script::format("--array={}", array_of(jobs)));
   add("--ntasks=1");
-  add("--chdir=" + name_for_sbatch(fs::current_path()));
-  add("--output=" + name_for_sbatch(logs) + "/slurm-%A_%a.out");
-  add(fmt::format("--signal=B:USR1@{}", kWarningSeconds));
-  script += fmt::format("exec {} batch {} --output {} --task \"$SLURM_ARRAY_TASK_ID\"\n",
-                        shell_word(options.program.string()),
-                        shell_word(fs::absolute(list_of(options.folder)).string()),
-                        shell_word(fs::absolute(options.folder).string()));
-  return script;
+  add(Script::format("--chdir={}", name_for_sbatch(fs::current_path())));
+  add(Script::format("--output={}/slurm-%A_%a.out", name_for_sbatch(logs)));
+  add(Script::format("--signal=B:USR1@{}", kWarningSeconds));
+  script += Script::format("exec {} batch {} --output {} --task \"$SLURM_ARRAY_TASK_ID\"\n",
+                           word(options.program), word(fs::absolute(list_of(options.folder))),
+                           word(fs::absolute(options.folder)));
+  return script.text();
 }
 
 std::string submit(const fs::path& folder, std::optional<int> task, const std::string& after) {

@@ -190,6 +190,7 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
   // Only the first process prints.
   if (!processes.is_root() && std::freopen("/dev/null", "w", stdout) == nullptr) return 1;
   if (processes.is_root()) base::set_log_sink(print_log);
+  tell_scratch_faults();
   base::share_machine_with(processes.size_on_machine());
   const auto tell = [&](const char* message) {
     if (processes.is_root()) say("tomofield: {}\n", message);

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "base/check.h"
+#include "base/checked_size.h"
 #include "field/tree/quadtree_bands.h"
 
 namespace tomofield::compact {
@@ -51,13 +52,13 @@ bool has_possible_ranks(const field::LeafShape& shape) {
 }
 
 std::size_t decoded_bytes(const std::vector<field::LeafShape>& shapes, int num_threads) {
-  constexpr std::size_t kMost = std::size_t{1} << 40;
-  std::size_t numbers = 0, vertices = 0;
+  constexpr std::int64_t kMost = std::int64_t{1} << 40;
+  base::CheckedSize numbers = 0;
+  std::size_t vertices = 0;
   std::vector<std::size_t> while_decoding;
   for (const field::LeafShape& shape : shapes) {
-    const std::size_t more = num_factors(shape) + num_vertices(shape);
-    if (more > kMost - numbers) return kNoMemoryHolds;  // the sum could wrap
-    numbers += more;
+    numbers = numbers + num_factors(shape) + num_vertices(shape);
+    if (!numbers.find(kMost)) return kNoMemoryHolds;
     vertices += num_vertices(shape);
     while_decoding.push_back(bytes_while_decoding(shape));
   }

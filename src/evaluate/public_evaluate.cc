@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "base/checked_size.h"
 #include "evaluate/resolution/fsc.h"
 #include "evaluate/similarity.h"
 #include "tomofield/error.h"
@@ -13,10 +14,8 @@ namespace {
 
 base::Volume volume_of(const Tomogram& tomogram, const char* name) {
   const auto [nx, ny, nz] = tomogram.size;
-  constexpr std::int64_t kLargestSide = std::int64_t{1} << 20;
-  const auto is_side = [](std::int64_t n) { return n >= 1 && n <= kLargestSide; };
-  const bool has_sides = is_side(nx) && is_side(ny) && is_side(nz);
-  if (!has_sides || tomogram.values.size() != base::Shape3{nx, ny, nz}.voxels())
+  const base::CheckedSize voxels = base::CheckedSize(nx) * ny * nz;
+  if (voxels.is(0) || !voxels.is(tomogram.values.size()))
     throw Error(fmt::format("the {} has {} values for {} × {} × {} voxels: give one a voxel", name,
                             tomogram.values.size(), nx, ny, nz));
   base::Volume volume;

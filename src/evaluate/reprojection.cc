@@ -12,6 +12,7 @@
 #include "base/threads/parallel.h"
 #include "base/utf8.h"
 #include "evaluate/box.h"
+#include "io/saving/scratch_memory.h"
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
 #include "measurement/undecided_beads.h"
@@ -167,7 +168,7 @@ VolumeScore score_volume(const VolumeScoreOptions& options) {
   specimen.thickness = static_cast<double>(volume.shape.nz) * series.bin_factor();
   check_volume(volume, measurement::plan_measurement(series, specimen), options.volume);
   measurement::Measurement prepared =
-      measurement::prepare_measurement(series, specimen, std::filesystem::temp_directory_path());
+      measurement::prepare_measurement(series, specimen, io::scratch_directory({}));
   keep_beads(prepared);  // all volumes are scored on the same rays
   std::vector<double> noise_weight;
   for (const double sigma : prepared.noise_sigma) noise_weight.push_back(1.0 / (sigma * sigma));

@@ -28,9 +28,10 @@ std::string text_of(const json& value) {
   return quote(value.dump(-1, ' ', false, json::error_handler_t::replace));
 }
 
-double number_in(const json& value, const char* key, double low, double high) {
-  const double number = value.is_number() ? value.get<double>() : low - 1;
-  if (number >= low && number <= high) return number;
+base::Finite number_in(const json& value, const char* key, double low, double high) {
+  if (value.is_number()) {
+    if (const auto number = base::Interval(low, high).find(value.get<double>())) return *number;
+  }
   throw Error(
       fmt::format("'{}' is {}, not a number from {} to {}", key, text_of(value), low, high));
 }
@@ -71,7 +72,7 @@ json parse_json(std::string_view text) {
 
 json read_json(const std::filesystem::path& path) { return parse_json(read_text_file(path)); }
 
-double number_at(const json& object, const char* key, double low, double high) {
+base::Finite number_at(const json& object, const char* key, double low, double high) {
   return number_in(entry(object, key), key, low, high);
 }
 

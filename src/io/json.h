@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/plausible.h"
 #include "io/saving/atomic_file.h"
 #include "tomofield/error.h"
 
@@ -38,7 +39,7 @@ std::string fault_text(const nlohmann::json::exception& fault);
 nlohmann::json read_json(const std::filesystem::path& path);
 
 /// Returns the number of an object under `key`, which must be from `low` to `high`.
-double number_at(const nlohmann::json& object, const char* key, double low, double high);
+base::Finite number_at(const nlohmann::json& object, const char* key, double low, double high);
 
 /// Returns the whole number of an object under `key`, which must be from `low` to `high`.
 std::int64_t integer_at(const nlohmann::json& object, const char* key, std::int64_t low,

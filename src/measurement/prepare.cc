@@ -14,6 +14,7 @@
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "measurement/read_rays.h"
+#include "measurement/view_units.h"
 #include "tilt_series/own_views.h"
 #include "tilt_series/resampling/align_image.h"
 #include "tilt_series/resampling/align_means.h"
@@ -151,8 +152,12 @@ std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& s
 }
 
 // Sets the density unit, the mean density and the background from the series' brightness.
-void set_unit(const std::vector<ViewBrightness>& views, double background, Measurement& prepared) {
+void set_unit(const std::vector<ViewBrightness>& views, const tilt_series::TiltSeries& series,
+              Measurement& prepared) {
   const geometry::TiltGeometry& g = prepared.geometry;
+  std::vector<double> contrasts;
+  for (const ViewBrightness& view : views) contrasts.push_back(view.contrast);
+  require_common_units(series, contrasts);
   std::vector<std::pair<double, double>> contrast_by_tilt;
   double mean_density = 0, brightness = 0;
   for (int v = 0; v < g.num_views(); ++v) {
@@ -170,8 +175,8 @@ void set_unit(const std::vector<ViewBrightness>& views, double background, Measu
   prepared.unit = contrast / (kContrastPerThickness * g.thickness);
   prepared.mean_density = mean_density / prepared.unit;
   const double mean = brightness / (g.num_views() * prepared.unit);
-  if (background / prepared.unit > kLeastBackground * mean)
-    prepared.background = background / prepared.unit;
+  if (series.background() / prepared.unit > kLeastBackground * mean)
+    prepared.background = series.background() / prepared.unit;
 }
 
 void set_noise(const tilt_series::TiltSeries& series, Measurement& prepared) {
@@ -329,7 +334,7 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
                                  std::span<std::uint8_t> valid) {
     series.read_view(view, image, valid);
   };
-  set_unit(brightness_of_views(series, read_view, shape, processes), series.background(), prepared);
+  set_unit(brightness_of_views(series, read_view, shape, processes), series, prepared);
   set_noise(series, prepared);
   prepared.rays = read_rays(
       series, {shape, 1, prepared.unit, band_rows, scratch_dir},
@@ -360,7 +365,7 @@ Measurement plan_realigned(const tilt_series::TiltSeries& recorded, const Specim
   prepared.ray_geometry.reset();
   set_unit(
       brightness_of_views(recorded, aligning(recorded, none), prepared.rays_shape(), processes),
-      recorded.background(), prepared);
+      recorded, prepared);
   set_noise(recorded, prepared);
   return prepared;
 }

@@ -14,7 +14,7 @@ namespace {
 constexpr double kMaxCount = 1e9;
 constexpr double kLeafStep = 16;  // rows of a slab (kernels/lanes.h): leaves have whole slabs
 constexpr double kMaxLeaf = 4096;
-constexpr Range kPixelSizes = Range::between(base::kSmallestPixel_A, base::kLargestPixel_A);
+constexpr Range kPixelSizes = Range::between(base::kPixelSizes_A.low(), base::kPixelSizes_A.high());
 
 constexpr std::string_view kUnbinned = "unbinned pixels";
 constexpr std::string_view kBinned = "binned pixels";

@@ -152,35 +152,30 @@ class ModelReader {
 
   void read_info(const StoredGroup& root, ModelInfo& info) const {
     require_known_format(root);
-    info.x_tilt_deg = root.number("x_tilt_deg");
-    info.pixel_size_A = root.number("pixel_size_A");
-    info.density_unit = root.number("density_unit");
+    info.x_tilt_deg = root.number("x_tilt_deg", base::kLargestAngle_deg);
+    info.pixel_size_A = root.number("pixel_size_A", base::kPixelSizes_A);
+    info.density_unit = root.number("density_unit", kLargestDensityUnit);
     info.is_dark = root.text("contrast") == "dark";
     info.options_json = root.text("options_json");
     info.written_by = root.text("written_by");
-    require(base::is_plausible(info.x_tilt_deg, base::kLargestAngle_deg) &&
-                base::is_plausible_pixel_size(info.pixel_size_A) &&
-                base::is_plausible(info.density_unit, kLargestDensityUnit),
-            "its pixel size or density unit is no usable number");
     read_geometry(root.group("geometry"), info);
   }
 
   void read_geometry(const StoredGroup& group, ModelInfo& info) const {
+    constexpr std::int64_t kFar = std::int64_t{1} << 20;  // in pixels; no detector is wider
     geometry::TiltGeometry& g = info.geometry;
     g.width = group.integer("width");
     g.height = group.integer("height");
-    g.thickness = group.number("thickness");
+    g.thickness = group.number("thickness", {0, static_cast<double>(kFar)});
     g.hand = small_integer(group.integer("hand"));
-    g.axis_x = group.number("axis_x");
-    g.axis_z = group.number("axis_z");
+    g.axis_x = group.number("axis_x", base::kLargestNumber);
+    g.axis_z = group.number("axis_z", base::kLargestNumber);
     g.tilt_deg = group.read_array<double>("tilt_deg");
     const auto roi = group.read_array<std::int64_t>("roi");
     require(roi.size() == 4, "its region of interest has no four corners");
     info.roi = {roi[0], roi[1], roi[2], roi[3]};
-    constexpr std::int64_t kFar = std::int64_t{1} << 20;  // in pixels; no detector is wider
     require(g.width > 0 && g.height > 0 && g.width <= kFar && g.height <= kFar && g.thickness > 0 &&
-                g.thickness <= kFar && (g.hand == 1 || g.hand == -1) &&
-                base::is_plausible(g.axis_x) && base::is_plausible(g.axis_z) &&
+                (g.hand == 1 || g.hand == -1) &&
                 std::all_of(g.tilt_deg.begin(), g.tilt_deg.end(),
                             [](double angle) { return std::abs(angle) < 90; }),
             "its geometry makes no sense");
@@ -248,8 +243,8 @@ class ModelReader {
   }
 
   double read_thickness(const StoredGroup& group) const {
-    const double thickness = group.number("thickness");
-    require(thickness > 0 && base::is_plausible(thickness), "its thickness is no usable number");
+    const double thickness = group.number("thickness", {0, base::kLargestNumber});
+    require(thickness > 0, "its thickness is no usable number");
     return thickness;
   }
 
@@ -263,11 +258,9 @@ class ModelReader {
   }
 
   void read_decoder(const StoredGroup& group, field::Field& field) const {
-    field.bias = static_cast<float>(group.number("bias"));
-    field.activation.beta = static_cast<float>(group.number("softplus_beta"));
-    require(std::isfinite(field.bias) && std::isfinite(field.activation.beta) &&
-                field.activation.beta >= 0,
-            "its decoder is no usable number");
+    field.bias = static_cast<float>(group.number("bias", base::kLargestNumber));
+    field.activation.beta =
+        static_cast<float>(group.number("softplus_beta", {0, base::kLargestNumber}));
   }
 
   std::unique_ptr<field::Field> read_field(const StoredGroup& group,

@@ -296,6 +296,7 @@ TEST(ModelFile, RefusesWhatIsConsistentHdf5ButNoSoundModel) {
   const std::vector<Damage> damages = {
       {"", ""},  // the editor itself does no harm
       {"f['field/parameters'][3] = float('nan')", "parameter 3"},
+      {"f['field/parameters'][3] = 1e10", "parameter 3"},
       {"del f['field/parameters']", "parameters"},
       {"p = f['field/parameters'][:-1]; del f['field/parameters']; f['field/parameters'] = p",
        "elements"},
@@ -303,20 +304,20 @@ TEST(ModelFile, RefusesWhatIsConsistentHdf5ButNoSoundModel) {
        "p.astype('f8')",
        "another type"},
       {"f['field'].attrs['kind'] = np.bytes_('mesh')", "mesh"},
-      {"f['field'].attrs['bias'] = float('inf')", "decoder"},
+      {"f['field'].attrs['bias'] = float('inf')", "bias"},
       {"f['field/leaves/nx'][2] = 1", "impossible shape"},
       {"f['field/leaves/nz'][2] = 60000", "more parameters"},
       {"for n in 'nx', 'ny', 'nz': f['field/leaves/' + n][:] = 65536", "more parameters"},
       {"f['geometry'].attrs['thickness'] = 1e300", "geometry"},
       {"f['field'].attrs['thickness'] = 1e300", "thickness"},
       {"f['geometry'].attrs['axis_x'] = 1e300", "geometry"},
-      {"f.attrs.modify('pixel_size_A', 1e300)", "pixel size"},
+      {"f.attrs.modify('pixel_size_A', 1e300)", "pixel_size_A"},
       {"f['field/tree/node_size'][1] = 32", "quadtree"},
       {"f['field/tree'].attrs['columns'] = np.int64(1) << 40", "out of range"},
       {"f['geometry'].attrs['hand'] = 2", "geometry"},
       {"f['geometry/tilt_deg'][1] = float('nan')", "geometry"},
       {"f['geometry/roi'][2] = 1000", "region of interest"},
-      {"f.attrs.modify('pixel_size_A', 0.0)", "pixel size"},
+      {"f.attrs.modify('pixel_size_A', 0.0)", "pixel_size_A"},
       {"del f['geometry']", "geometry"},
   };
   std::string script = kEditor;

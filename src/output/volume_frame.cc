@@ -1,7 +1,14 @@
 #include "output/volume_frame.h"
 
+#include <fmt/format.h>
 #include <cmath>
 #include <numbers>
+
+#include "align/alignment_record.h"
+#include "io/is_file.h"
+#include "io/json.h"
+#include "output/output_paths.h"
+#include "tomofield/error.h"
 
 namespace tomofield::output {
 namespace {
@@ -57,6 +64,24 @@ field::OrientedBox VolumeFrame::to_field(const field::OrientedBox& box) const {
   turned_box.centre_px = to_field(box.centre_px);
   turned_box.field_from_box = product(field_from_volume_, box.field_from_box);
   return turned_box;
+}
+
+Levelling found_levelling(const std::filesystem::path& model) {
+  constexpr const char* kAdvice = "give both angles in degrees: --level PITCH,X_TILT";
+  const std::filesystem::path path = output_paths(model).alignment;
+  if (!io::is_file(path)) {
+    throw Error(
+        fmt::format("there is no '{}' beside '{}', which --align writes, to level it by: {}",
+                    path.string(), model.string(), kAdvice));
+  }
+  try {
+    const alignment::AlignmentRecord record = alignment::record_from(io::read_json(path));
+    if (!record.pose) throw Error("the views could not tell the pitch");
+    return {.pitch_deg = record.pose->pose.pitch_deg, .x_tilt_deg = record.pose->pose.x_tilt_deg};
+  } catch (const std::exception& error) {
+    throw Error(fmt::format("'{}' does not tell how to level the specimen: {}; {}", path.string(),
+                            error.what(), kAdvice));
+  }
 }
 
 }  // namespace tomofield::output

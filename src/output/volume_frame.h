@@ -1,5 +1,7 @@
 #pragma once
 
+#include <filesystem>
+
 #include "field/sampling/sample_box.h"
 #include "output/model_file.h"
 
@@ -31,5 +33,10 @@ class VolumeFrame {
   field::Point centre_;
   field::Rotation field_from_volume_;
 };
+
+/// Returns how far the specimen of a model was found to be from level by the alignment of its
+/// run, which lies beside the model (NAME_align.json of NAME.h5). Throws Error if there is none, or
+/// if it could not tell.
+Levelling found_levelling(const std::filesystem::path& model);
 
 }  // namespace tomofield::output

@@ -113,7 +113,8 @@ std::string effect_of_z_factors(CommandEntries& tilt) {
   double largest = 0.0;
   for (const io::TextLine& line : io::read_text_lines(path))
     for (const std::string_view word : io::split_words(line.text))
-      largest = std::max(largest, std::abs(io::parse_number(word).value_or(0.0)));
+      if (const auto number = io::parse_number(word))
+        largest = std::max(largest, std::abs(*number));
   return fmt::format("{}: by up to {:.2g} pixels at the faces of the specimen", effect,
                      largest * *thickness / 2);
 }

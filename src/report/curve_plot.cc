@@ -248,7 +248,7 @@ std::pair<double, double> range_with_room(const std::vector<Curve>& curves, doub
   return {low - room, high + room};
 }
 
-std::string curve_plot_svg(const PlotAxes& axes, const std::vector<Curve>& curves) {
+base::Html curve_plot_svg(const PlotAxes& axes, const std::vector<Curve>& curves) {
   const Legend legend = legend_of<SvgSurface>(curves);
   SvgSurface surface(kWidth, height_for(axes, legend));
   Plot(axes, curves, legend, surface).draw();

@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/code_text.h"
+
 namespace tomofield::report {
 
 /// A named line through points (x, y), in order. With errors, one of each point, the points have
@@ -40,7 +42,7 @@ struct CurvePlot {
 /// element that needs nothing else. Points that are not finite interrupt a curve; points beyond the
 /// ends of the y axis are drawn at the ends. At most twelve curves have a colour of their own. A
 /// long name takes several lines of the legend, and the picture is as high as its legend needs.
-std::string curve_plot_svg(const PlotAxes& axes, const std::vector<Curve>& curves);
+base::Html curve_plot_svg(const PlotAxes& axes, const std::vector<Curve>& curves);
 /// Draws plots, of which there is one at least, one below the other as a PNG that is 900 pixels
 /// wide, with the letters of report/canvas.h. Replaces `path`. Throws Error if it cannot be
 /// written.

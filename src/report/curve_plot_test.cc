@@ -42,9 +42,10 @@ TEST(LogTicks, AreOneTwoAndFiveTimesPowersOfTen) {
 
 TEST(CurvePlot, DrawsEveryCurveAndItsName) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const std::string svg = curve_plot_svg(
-      {.x_title = "a & b", .y_title = "density"},
-      {{"first", {{0, 0}, {1, 1}, {2, nan}, {3, 1}, {4, 0}}}, {"second", {{0, 1}, {4, 1}}}});
+  const std::string svg = curve_plot_svg({.x_title = "a & b", .y_title = "density"},
+                                         {{"first", {{0, 0}, {1, 1}, {2, nan}, {3, 1}, {4, 0}}},
+                                          {"second", {{0, 1}, {4, 1}}}})
+                              .text();
   EXPECT_NE(svg.find(">first</text>"), std::string::npos);
   EXPECT_NE(svg.find(">second</text>"), std::string::npos);
   EXPECT_NE(svg.find(">a &amp; b</text>"), std::string::npos);
@@ -55,7 +56,8 @@ TEST(CurvePlot, DrawsEveryCurveAndItsName) {
 
 TEST(CurvePlot, TwelveCurvesHaveColoursOfTheirOwn) {
   const std::string svg = curve_plot_svg({.x_title = "x", .y_title = "y"},
-                                         std::vector<Curve>(12, Curve{"curve", {{0, 0}, {1, 1}}}));
+                                         std::vector<Curve>(12, Curve{"curve", {{0, 0}, {1, 1}}}))
+                              .text();
   std::set<std::string> colours;
   const std::string key = "stroke=\"";
   for (std::size_t at = svg.find(key); at != std::string::npos; at = svg.find(key, at + 1))
@@ -65,7 +67,7 @@ TEST(CurvePlot, TwelveCurvesHaveColoursOfTheirOwn) {
 
 // Returns the heights of the texts in the legend and the height of the picture.
 std::pair<std::vector<double>, double> legend_of(const std::vector<Curve>& curves) {
-  const std::string svg = curve_plot_svg({.x_title = "x", .y_title = "y"}, curves);
+  const std::string svg = curve_plot_svg({.x_title = "x", .y_title = "y"}, curves).text();
   std::vector<double> heights;
   const std::string key = "<text x=\"708.0\" y=\"";
   for (std::size_t at = svg.find(key); at != std::string::npos; at = svg.find(key, at + 1))
@@ -94,7 +96,8 @@ TEST(CurvePlot, HasTheTicksThatAreGiven) {
                                           .x_range = {0, 2},
                                           .y_range = {0, 1},
                                           .y_ticks = {{0.5, "half"}}},
-                                         {});
+                                         {})
+                              .text();
   EXPECT_NE(svg.find("d=\"M70.0 167.5 L660.0 167.5 \""), std::string::npos) << svg;
   EXPECT_NE(svg.find(">half</text>"), std::string::npos);
   EXPECT_EQ(svg.find(">0.8</text>"), std::string::npos);

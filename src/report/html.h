@@ -5,12 +5,10 @@
 #include <string_view>
 #include <vector>
 
+#include "base/code_text.h"
 #include "report/embedded_volume.h"
 
 namespace tomofield::report {
-
-/// Returns a text with the special characters of HTML replaced.
-std::string html_text(std::string_view text);
 
 /// A link to a file, by its path from the page.
 struct HtmlLink {
@@ -61,9 +59,9 @@ class HtmlPage {
   /// Adds figures side by side, as many as fit. Throws Error if a picture cannot be read.
   void add_figures(const std::vector<HtmlFigure>& figures, FigureSize size = FigureSize::kSmall);
   /// Adds an SVG element without a change (report/curve_plot.h).
-  void add_svg(std::string_view svg);
+  void add_svg(const base::Html& svg);
   /// Adds an SVG element with a text beside it.
-  void add_svg(std::string_view svg, std::string_view text);
+  void add_svg(const base::Html& svg, std::string_view text);
   /// Adds numbers side by side.
   void add_facts(const std::vector<HtmlFact>& facts);
   /// Adds a framed text: a title and paragraphs. A warning has another colour.
@@ -78,7 +76,7 @@ class HtmlPage {
   std::string document() const;
 
  private:
-  std::string title_, body_, scripts_;
+  base::Html title_, body_, scripts_;
 };
 
 }  // namespace tomofield::report

@@ -7,7 +7,6 @@
 #include <cstdint>
 
 #include "report/canvas.h"
-#include "report/html.h"
 
 namespace tomofield::report {
 namespace {
@@ -19,26 +18,27 @@ std::int64_t nearest(double value) { return std::lround(value); }
 }  // namespace
 
 SvgSurface::SvgSurface(int width, int height)
-    : svg_(fmt::format(
+    : svg_(base::Html::format(
           "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
           "height=\"{1}\" font-family=\"system-ui, sans-serif\" font-size=\"{2}\">\n",
           width, height, kFontSize)) {}
 
 void SvgSurface::draw_line(const std::vector<Point>& points, double width, const Colour& colour) {
-  std::string path;
+  base::Html path;
   for (const Point& point : points)
-    path += fmt::format("{}{:.1f} {:.1f} ", path.empty() ? "M" : "L", point.x, point.y);
-  svg_ += fmt::format(
+    path += base::Html::format("{}{:.1f} {:.1f} ", path.empty() ? base::Html("M") : "L", point.x,
+                               point.y);
+  svg_ += base::Html::format(
       "<path d=\"{}\" fill=\"none\" stroke=\"#{:02x}{:02x}{:02x}\" stroke-width=\"{}\"/>\n", path,
       colour[0], colour[1], colour[2], width);
 }
 
 void SvgSurface::draw_text(Point at, Anchor anchor, std::string_view text) {
-  const char* const name = anchor == Anchor::kStart    ? "start"
-                           : anchor == Anchor::kMiddle ? "middle"
-                                                       : "end";
-  svg_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n", at.x, at.y,
-                      name, html_text(text));
+  const base::Html name = anchor == Anchor::kStart    ? "start"
+                          : anchor == Anchor::kMiddle ? base::Html("middle")
+                                                      : "end";
+  svg_ += base::Html::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n", at.x,
+                             at.y, name, base::Html::of(text));
 }
 
 // The browser chooses the letters: on average they are a little over half as wide as high.

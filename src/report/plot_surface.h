@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/code_text.h"
 #include "report/canvas.h"
 
 namespace tomofield::report {
@@ -33,10 +34,10 @@ class SvgSurface : public PlotSurface {
   /// Returns the approximate width of a text.
   static double text_width(std::string_view text);
   /// Returns the SVG element.
-  std::string element() const { return svg_ + "</svg>\n"; }
+  base::Html element() const { return base::Html::format("{}</svg>\n", svg_); }
 
  private:
-  std::string svg_;
+  base::Html svg_;
 };
 
 class PngSurface : public PlotSurface {

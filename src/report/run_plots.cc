@@ -25,7 +25,7 @@ bool has_points(const Curve& curve) {
 }
 
 // Draws the curves that have points.
-std::string plot(const PlotAxes& axes, std::vector<Curve> curves) {
+base::Html plot(const PlotAxes& axes, std::vector<Curve> curves) {
   std::erase_if(curves, [](const Curve& curve) { return !has_points(curve); });
   return curves.empty() ? "" : curve_plot_svg(axes, curves);
 }
@@ -68,7 +68,7 @@ Curve with_marks(Curve curve) {
 
 }  // namespace
 
-std::string loss_plot(const AllFits& fits) {
+base::Html loss_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const NamedFit& fit : fits) {
     curves.push_back(epoch_curve(name_of("fitted views", fit), fit.metrics().data_loss));
@@ -84,13 +84,13 @@ std::string loss_plot(const AllFits& fits) {
               curves);
 }
 
-std::string trials_plot(const std::optional<tune::TunedFit>& tuned) {
+base::Html trials_plot(const std::optional<tune::TunedFit>& tuned) {
   if (!tuned) return "";
   const CurvePlot choice = choice_plot(*tuned);
   return curve_plot_svg(choice.axes, choice.curves);
 }
 
-std::string residual_plot(const AllFits& fits) {
+base::Html residual_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const NamedFit& fit : fits) {
     const record::FitMetrics& metrics = fit.metrics();
@@ -113,7 +113,7 @@ std::string residual_plot(const AllFits& fits) {
               curves);
 }
 
-std::string scale_plot(const AllFits& fits) {
+base::Html scale_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const NamedFit& fit : fits) {
     curves.push_back(tilt_curve(name_of("scale", fit), fit.metrics(), &record::ViewMetrics::scale));
@@ -124,7 +124,7 @@ std::string scale_plot(const AllFits& fits) {
               curves);
 }
 
-std::string offset_plot(const AllFits& fits) {
+base::Html offset_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const NamedFit& fit : fits) {
     curves.push_back(
@@ -138,7 +138,7 @@ std::string offset_plot(const AllFits& fits) {
               curves);
 }
 
-std::string displacement_plot(const AllFits& fits) {
+base::Html displacement_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const NamedFit& fit : fits) {
     const std::optional<verdict::ViewAgreement>& compared = fit.fit.verdict.views;
@@ -160,7 +160,7 @@ std::string displacement_plot(const AllFits& fits) {
               curves);
 }
 
-std::string masked_plot(const AllFits& fits) {
+base::Html masked_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const NamedFit& fit : fits) {
     const output::MaskedViews& mask = fit.metrics().mask;
@@ -174,7 +174,7 @@ std::string masked_plot(const AllFits& fits) {
               curves);
 }
 
-std::string halves_plot(const evaluate::Fsc& fsc) {
+base::Html halves_plot(const evaluate::Fsc& fsc) {
   if (fsc.frequency_per_A.empty()) return "";
   std::vector<Curve> curves{fsc_curve("both halves", fsc.frequency_per_A, fsc.all.correlation)};
   if (fsc.measured)
@@ -185,7 +185,7 @@ std::string halves_plot(const evaluate::Fsc& fsc) {
   return plot(fsc_axes(fsc.frequency_per_A.back()), curves);
 }
 
-std::string histogram_plot(const std::vector<float>& voxels) {
+base::Html histogram_plot(const std::vector<float>& voxels) {
   constexpr int kBins = 120;
   if (voxels.empty()) return "";
   const double black = base::percentile(voxels, 0.5), white = base::percentile(voxels, 99.5);

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "base/code_text.h"
 #include "evaluate/resolution/fsc.h"
 #include "record/run_record.h"
 #include "tune/trial_settings.h"
@@ -22,22 +23,22 @@ using AllFits = std::vector<NamedFit>;
 // plot.
 
 /// Plots the residual of the fitted views, and the error of held-out ones, over the epochs.
-std::string loss_plot(const AllFits& fits);
+base::Html loss_plot(const AllFits& fits);
 /// Plots how well the trials of different weights predict held-out views.
-std::string trials_plot(const std::optional<tune::TunedFit>& tuned);
+base::Html trials_plot(const std::optional<tune::TunedFit>& tuned);
 /// Plots the residual of each view over its tilt, and the error of the held-out ones.
-std::string residual_plot(const AllFits& fits);
+base::Html residual_plot(const AllFits& fits);
 /// Plots the fitted scale of each view, and its weight relative to others, over the tilt.
-std::string scale_plot(const AllFits& fits);
+base::Html scale_plot(const AllFits& fits);
 /// Plots the fitted offset and the noise of each view over the tilt.
-std::string offset_plot(const AllFits& fits);
+base::Html offset_plot(const AllFits& fits);
 /// Plots how far views lie from where the tomogram predicts them, over the tilt.
-std::string displacement_plot(const AllFits& fits);
+base::Html displacement_plot(const AllFits& fits);
 /// Plots the masked part of each view over the tilt.
-std::string masked_plot(const AllFits& fits);
+base::Html masked_plot(const AllFits& fits);
 /// Plots the shell correlation of two halves.
-std::string halves_plot(const evaluate::Fsc& fsc);
+base::Html halves_plot(const evaluate::Fsc& fsc);
 /// Plots how many of these voxels have which density.
-std::string histogram_plot(const std::vector<float>& voxels);
+base::Html histogram_plot(const std::vector<float>& voxels);
 
 }  // namespace tomofield::report

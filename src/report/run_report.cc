@@ -191,11 +191,11 @@ std::vector<HtmlCell> option_cells(const ReportedOption& option) {
 }
 
 // Returns an option with the diameter of the beads that were masked, if nobody gave it.
-ReportedOption with_found_beads(ReportedOption option, const json& mask) {
-  const bool is_found =
-      option.flag == "--bead-diameter" && option.is_default && mask.at("bead_masking") == "masked";
+ReportedOption with_found_beads(ReportedOption option, const tilt_series::MaskMetrics& masks) {
+  const bool is_found = option.flag == "--bead-diameter" && option.is_default &&
+                        masks.bead_masking == tilt_series::BeadMasking::kMasked;
   if (!is_found) return option;
-  option.value = fmt::format("{:.3g} nm", io::number_or_nan(mask.at("bead_diameter_nm")));
+  option.value = fmt::format("{:.3g} nm", masks.bead_diameter_A / 10);
   option.origin = "found in the views";
   option.is_default = false;
   return option;
@@ -216,9 +216,9 @@ void add_input(const ReportSource& source, HtmlPage& page) {
         "tomogram. What was corrected in the stack before stays corrected.");
   using Rows = std::vector<std::vector<HtmlCell>>;
   Rows chosen{{{"option", ""}, {"value", ""}, {"from", ""}, {"meaning", ""}}}, defaults = chosen;
-  const json& mask = source.record.at("metrics").at("mask");
+  const tilt_series::MaskMetrics& masks = source.record.fit.metrics.mask.masks;
   for (const ReportedOption& reported : reported_options(source.files, source.options)) {
-    const ReportedOption option = with_found_beads(reported, mask);
+    const ReportedOption option = with_found_beads(reported, masks);
     (option.is_default ? defaults : chosen).push_back(option_cells(option));
   }
   page.add_table(chosen, TableOf::kWords);
@@ -246,7 +246,7 @@ void add_pictures(const ReportSource& source, const AllFits& fits, HtmlPage& pag
   page.add_heading("Masks");
   page.add_paragraph(mask_text(metrics.mask));
   page.add_figures({{source.pictures.mask, "The view of lowest tilt"}}, FigureSize::kLarge);
-  if (const std::string plot = masked_plot(fits); !plot.empty()) page.add_svg(plot);
+  if (const base::Html plot = masked_plot(fits); !plot.empty()) page.add_svg(plot);
   if (!source.pictures.tree) return;
   page.add_heading("Tree");
   page.add_paragraph(
@@ -257,7 +257,7 @@ void add_pictures(const ReportSource& source, const AllFits& fits, HtmlPage& pag
 }
 
 // Adds a plot with its heading and explanation, if there is one.
-void add_plot(const char* heading, const char* text, const std::string& svg, HtmlPage& page) {
+void add_plot(const char* heading, const char* text, const base::Html& svg, HtmlPage& page) {
   if (svg.empty()) return;
   page.add_heading(heading);
   page.add_svg(svg, text);

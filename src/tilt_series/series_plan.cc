@@ -157,7 +157,8 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& s
   if (options.pixel_size_A) {
     if (base::is_plausible_pixel_size(*options.pixel_size_A)) return *options.pixel_size_A;
     throw Error(fmt::format("the pixel size {} Å (--pixel-size) is not from {} to {} Å",
-                            *options.pixel_size_A, base::kSmallestPixel_A, base::kLargestPixel_A));
+                            *options.pixel_size_A, base::kPixelSizes_A.low(),
+                            base::kPixelSizes_A.high()));
   }
   const auto& [in_header_A, height_A, depth_A] = stack.header().voxel_size_A;
   if (height_A > 0.0 && std::fabs(in_header_A - height_A) > 0.001 * std::fabs(in_header_A))

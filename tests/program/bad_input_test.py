@@ -230,6 +230,22 @@ def test_pixels_that_are_no_measurements(good, out, refuse_series, stack, stack_
     refuse_series([stack, "section 1"], stack, "--xf", away)
 
 
+def test_views_in_other_units_are_named(good, refuse_series, stack_file, tmp_path):
+    """One view decides the fit, or lets it diverge, if its numbers are a thousand times others."""
+    structured = views + 5 * np.sin(np.arange(NX, dtype=np.float32) / 5)
+    for factor in (1e4, 1e12, 1e-6, 1e-12):
+        values = structured.copy()
+        values[4] *= np.float32(factor)
+        name = stack_file("units.mrc", values)
+        refuse_series(["section 5", "other units", "--exclude 5"], name)
+    for factor, warns in ((100, True), (0.01, True), (10, False)):
+        values = structured.copy()
+        values[4] *= np.float32(factor)
+        name = stack_file("units.mrc", values)
+        result = harness.succeed("reconstruct", name, "-o", tmp_path / f"{factor}.mrc", *good)
+        assert ("section 5" in result.stderr and "--exclude 5" in result.stderr) == warns, result
+
+
 def test_contrast_transfers_that_no_view_can_show(refuse_series, stack, path):
     """The rings of the transfer would be narrower than the view can tell apart."""
     for options in (["--defocus", 1000], ["--defocus", 3, "--pixel-size", 0.001]):

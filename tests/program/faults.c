@@ -1,11 +1,17 @@
 // A library for LD_PRELOAD that lets one call of the program fail, or kills the program there
 // (faults.py). The environment says which:
-//   FAULT_KIND    open, read, write, sync, rename, allocate, or io for all of these but the last
+//   FAULT_KIND    open, read, write, sync, close, rename, allocate, or io for all of these but the
+//                 last
 //   FAULT_NUMBER  the call of this kind that fails, from 1; 0 only counts
-//   FAULT_MODE    once, from (this call and all that follow), or kill
+//   FAULT_MODE    once, from (this call and all that follow), or kill; once-done and from-done carry
+//                 out the renames and second names that they say have failed, as servers of NFS do
+//                 whose answers get lost
+//   FAULT_ERROR   the number of the error; without it each kind has one of its own
 //   FAULT_FOLDER  only calls for files below this folder count
 //   FAULT_COUNT   the file in which the number of such calls is written when the program ends
 //   FAULT_LARGE   allocations of more bytes than this count
+//   FAULT_FREE    the bytes that every file system says it has left; -1 lets it tell the truth
+//   FAULT_RESERVE if it is set, file systems say that they have reserved room, and have not
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -16,6 +22,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/statvfs.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -25,7 +32,8 @@ void* __libc_realloc(void*, size_t);
 void* __libc_memalign(size_t, size_t);
 
 static atomic_long g_count;
-static long g_number, g_large;
+static long g_number, g_large, g_free = -1;
+static int g_error, g_reserves_nothing;
 static const char *g_kind = "", *g_mode = "", *g_folder = "";
 
 __attribute__((constructor)) static void begin(void) {
@@ -33,6 +41,9 @@ __attribute__((constructor)) static void begin(void) {
   g_number = number ? atol(number) : 0;
   const char* large = getenv("FAULT_LARGE");
   g_large = large ? atol(large) : 1 << 20;
+  if (getenv("FAULT_ERROR")) g_error = atoi(getenv("FAULT_ERROR"));
+  if (getenv("FAULT_FREE")) g_free = atol(getenv("FAULT_FREE"));
+  g_reserves_nothing = getenv("FAULT_RESERVE") != NULL;
   if (getenv("FAULT_KIND")) g_kind = getenv("FAULT_KIND");
   if (getenv("FAULT_MODE")) g_mode = getenv("FAULT_MODE");
   if (getenv("FAULT_FOLDER")) g_folder = getenv("FAULT_FOLDER");
@@ -54,8 +65,10 @@ static int must_fail(const char* kind) {
   const long count = atomic_fetch_add(&g_count, 1) + 1;
   if (g_number == 0 || count < g_number) return 0;
   if (strcmp(g_mode, "kill") == 0) raise(SIGKILL);
-  return count == g_number || strcmp(g_mode, "from") == 0;
+  return count == g_number || strncmp(g_mode, "from", 4) == 0;
 }
+
+static int is_done_all_the_same(void) { return strstr(g_mode, "-done") != NULL; }
 
 static int path_fails(const char* kind, const char* path) {
   if (!*g_folder || strncmp(path, g_folder, strlen(g_folder)) != 0) return 0;
@@ -75,8 +88,8 @@ static int file_fails(const char* kind, int file) {
 #define NEXT(name) ((__typeof__(&name))dlsym(RTLD_NEXT, #name))
 #define FAIL(code, value)  \
   do {                     \
-    errno = (code);        \
-    return value;          \
+    errno = g_error ? g_error : (code); \
+    return value;                       \
   } while (0)
 
 #define OPEN(name)                                              \
@@ -131,10 +144,41 @@ WRITE_AT(pwrite64)
 SYNC(fsync)
 SYNC(fdatasync)
 
-int rename(const char* from, const char* to) {
-  if (path_fails("rename", from)) FAIL(EIO, -1);
-  return NEXT(rename)(from, to);
+// The descriptor is closed all the same, as the system closes it.
+int close(int file) {
+  const int fails = file_fails("close", file);
+  const int result = NEXT(close)(file);
+  if (fails) FAIL(EIO, -1);
+  return result;
 }
+
+#define NAME_ANOTHER(name)                                       \
+  int name(const char* from, const char* to) {                   \
+    const int fails = path_fails("rename", from);                \
+    if (fails && is_done_all_the_same()) NEXT(name)(from, to);   \
+    if (fails) FAIL(EIO, -1);                                    \
+    return NEXT(name)(from, to);                                 \
+  }
+NAME_ANOTHER(rename)
+NAME_ANOTHER(link)
+
+#define TELL_SPACE(name, type)                                                   \
+  int name(const char* path, struct type* status) {                              \
+    const int result = NEXT(name)(path, status);                                 \
+    if (g_free >= 0)                                                             \
+      status->f_bfree = status->f_bavail = (fsblkcnt_t)g_free / status->f_frsize; \
+    return result;                                                               \
+  }
+TELL_SPACE(statvfs, statvfs)
+TELL_SPACE(statvfs64, statvfs64)
+
+#define RESERVE(name)                                              \
+  int name(int file, off_t offset, off_t bytes) {                  \
+    if (g_reserves_nothing) return ftruncate(file, offset + bytes); \
+    return NEXT(name)(file, offset, bytes);                        \
+  }
+RESERVE(posix_fallocate)
+RESERVE(posix_fallocate64)
 
 static int allocation_fails(size_t bytes) { return g_large > 0 && bytes > (size_t)g_large && must_fail("allocate"); }
 

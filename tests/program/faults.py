@@ -6,6 +6,7 @@ tries every N-th call of each kind (every one, unless N is given) and prints a t
 tries some of them."""
 
 import argparse
+import errno
 import json
 import os
 import pathlib
@@ -14,7 +15,12 @@ import subprocess
 import sys
 import tempfile
 
-KINDS = ("open", "read", "write", "sync", "rename", "allocate")
+KINDS = ("open", "read", "write", "sync", "close", "rename", "allocate")
+# What a file server that is away or lost its files answers; its renames may be done all the same.
+SERVER = (("open", "once", errno.ESTALE), ("write", "once", errno.EIO), ("sync", "once", errno.EIO),
+          ("sync", "from", errno.ESTALE), ("close", "once", errno.EIO), ("close", "from", errno.EIO),
+          ("rename", "once", errno.ESTALE), ("rename", "from", errno.ESTALE),
+          ("rename", "once-done", errno.ESTALE), ("rename", "from-done", errno.ESTALE))
 KILLS, DISKS = 100, 20
 FIT = ["--epochs", 2, "--subsets", 3, "--checkpoint-minutes", 0, "--threads", 2]
 LARGE = 64 << 10  # bytes; the run is small, so that allocations of this size are its large ones
@@ -34,16 +40,16 @@ def build(folder):
 class Fault:
     """One run of `command` in which one call fails, or from one call on all do."""
 
-    def __init__(self, kind, number=0, mode="once"):
-        self.kind, self.number, self.mode = kind, number, mode
+    def __init__(self, kind, number=0, mode="once", error=0):
+        self.kind, self.number, self.mode, self.error = kind, number, mode, error
 
     def __str__(self):
-        return f"{self.kind} {self.number} ({self.mode})"
+        return f"{self.kind} {self.number} ({self.mode}, {errno.errorcode.get(self.error)})"
 
     def environment(self, library, folder, count_file):
         return dict(os.environ, LD_PRELOAD=library, FAULT_KIND=self.kind, FAULT_MODE=self.mode,
                     FAULT_NUMBER=str(self.number), FAULT_FOLDER=folder, FAULT_COUNT=count_file,
-                    FAULT_LARGE=str(LARGE))
+                    FAULT_LARGE=str(LARGE), FAULT_ERROR=str(self.error))
 
 
 class Sweep:
@@ -221,6 +227,11 @@ def sweep_all(sweep, every):
             failed += try_all(f"{kind} fails {mode}", [
                 lambda fault=Fault(kind, n, mode), old=(i + (mode == "from")) % 2 == 1:
                 sweep.check(fault, old) for i, n in enumerate(numbers)])
+    for kind, mode, error in SERVER:
+        numbers = range(1, sweep.count(kind) + 1, every)
+        failed += try_all(f"{kind} fails {mode} ({errno.errorcode[error]})", [
+            lambda fault=Fault(kind, n, mode, error), old=i % 2 == 1: sweep.check(fault, old)
+            for i, n in enumerate(numbers)])
     kills = moments(sweep.count("io"), max(2, KILLS // every))
     failed += try_all("SIGKILL", [
         lambda fault=Fault("io", n, "kill"), old=i % 2 == 1: sweep.check(fault, old)

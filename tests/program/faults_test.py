@@ -2,6 +2,8 @@
 sentence, leaves old or new files, and is repeated with the same bits. `python3
 tests/program/faults.py` tries every call; these tests try some of each kind."""
 
+import os
+
 import pytest
 
 import faults
@@ -28,6 +30,18 @@ def test_a_call_that_fails_ends_in_one_sentence(kind, sweep):
             for number, mode, has_old_results in ((count // 3, "once", True), (2, "from", False),
                                                   (count - 1, "from", True))]
     assert any(ends), "no fault was noticed"
+
+
+@pytest.mark.parametrize("kind, mode, error", faults.SERVER)
+def test_a_file_server_that_fails_takes_nothing_away(kind, mode, error, sweep):
+    count = sweep.count(kind)
+    for i, number in enumerate(faults.moments(count, 4)):
+        ended = sweep.check(faults.Fault(kind, number, mode, error), i % 2 == 0)
+        assert ended.returncode in (0, 2), (number, ended)
+        if ended.returncode == 2:
+            assert sweep.scratch in ended.stderr and os.strerror(error) in ended.stderr, ended
+        if mode.endswith("done"):
+            assert ended.returncode == 0, (number, ended)  # what was renamed is renamed
 
 
 def test_memory_that_ends_before_a_checkpoint_ends_in_one_sentence(sweep):

@@ -88,6 +88,19 @@ TEST_F(ChildProcess, HasFailedForWhatItSaysInItsOwnName) {
   EXPECT_EQ(reason_of_failure(log_), "Killed");
 }
 
+TEST_F(ChildProcess, HasAReasonEvenIfItWasKilledOrSaidNothing) {
+  const auto reason = [&](const char* script) {
+    return reason_of_failure(run(script).exit_status, log_);
+  };
+  EXPECT_EQ(reason("echo 'tomofield: no such file' >&2; exit 2"), "no such file");
+  EXPECT_NE(reason("echo 3 of 4; kill -KILL $$").find("killed"), std::string::npos);
+  const std::string stopped = reason("echo 3 of 4; kill -ABRT $$");
+  for (const char* part : {"signal 6", "3 of 4"})
+    EXPECT_NE(stopped.find(part), std::string::npos) << stopped;
+  EXPECT_NE(reason("kill -ABRT $$").find("said nothing"), std::string::npos);
+  EXPECT_NE(reason("exit 3").find("status 3"), std::string::npos);
+}
+
 TEST_F(ChildProcess, ThatDoesNotExistIsAnError) {
   EXPECT_THROW(run_child({"/nowhere/program"}, log_, {}), Error);
 }

@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <cstring>
 
+#include "io/saving/scratch_memory.h"
+
 namespace tomofield::cli {
 namespace {
 
@@ -19,6 +21,16 @@ void remember_failure(bool has_failed) {
 
 volatile std::sig_atomic_t g_signal = 0;
 void remember_signal(int signal) { g_signal = signal; }
+
+void end_program(int signal) {
+  const std::string_view line = io::scratch_fault();
+  if (line.empty()) {  // another cause: the access is tried again, and ends the program
+    std::signal(signal, SIG_DFL);
+    return;
+  }
+  (void)!::write(STDERR_FILENO, line.data(), line.size());
+  ::_exit(2);
+}
 
 }  // namespace
 
@@ -61,5 +73,7 @@ void stop_on_signals(bool is_job) {
 bool stop_was_requested() { return g_signal != 0; }
 
 int stop_status() { return 128 + (g_signal != 0 ? g_signal : SIGTERM); }
+
+void tell_scratch_faults() { std::signal(SIGBUS, end_program); }
 
 }  // namespace tomofield::cli

@@ -70,4 +70,8 @@ bool stop_was_requested();
 /// another process of the job did, and SIGTERM's status is returned.
 int stop_status();
 
+/// Lets a disk that loses a scratch file while it is used (SIGBUS) end the program with a sentence
+/// and status 2, as other faults of the disk do.
+void tell_scratch_faults();
+
 }  // namespace tomofield::cli

@@ -71,7 +71,8 @@ std::optional<double> series_pixel_A(const fs::path& path, const io::StarTable& 
     const auto size_A = io::StarRow(path, optics, row).find_number(kSeriesPixel);
     if (!size_A || base::is_plausible_pixel_size(*size_A)) return size_A;
     throw Error(fmt::format("'{}': _{} is {} Å, and pixels have {} to {} Å", path.string(),
-                            kSeriesPixel, *size_A, base::kSmallestPixel_A, base::kLargestPixel_A));
+                            kSeriesPixel, *size_A, base::kPixelSizes_A.low(),
+                            base::kPixelSizes_A.high()));
   }
   return std::nullopt;
 }

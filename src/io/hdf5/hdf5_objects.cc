@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "base/checked_size.h"
 #include "io/hdf5/lookup3.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -178,7 +179,7 @@ void read_space(Cursor at, Hdf5Values& values) {
   if (kind > 1 || (kind == 0) != (values.rank == 0) || values.rank > 1)
     refuse_feature("an array that is not one-dimensional");
   const std::uint64_t count = values.rank == 0 ? 1 : at.number(8);
-  require(count <= std::numeric_limits<std::int64_t>::max() / values.bytes_each,
+  require((base::CheckedSize(count) * values.bytes_each).find().has_value(),
           "an array is impossibly large");
   values.count = static_cast<std::size_t>(count);
 }

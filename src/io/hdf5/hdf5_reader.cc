@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <optional>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -39,6 +40,21 @@ T first(const Hdf5Attribute& attribute) {
   TOMOFIELD_CHECK(attribute.bytes.size() >= sizeof value, "the attribute has a value");
   std::memcpy(&value, attribute.bytes.data(), sizeof value);
   return value;
+}
+
+std::optional<double> number_in(const Hdf5Attribute& attribute) {
+  switch (attribute.values.type) {
+    case Type::kFloat32:
+      return static_cast<double>(first<float>(attribute));
+    case Type::kFloat64:
+      return first<double>(attribute);
+    case Type::kInteger64:
+      return static_cast<double>(first<std::int64_t>(attribute));
+    case Type::kByte:
+    case Type::kText:
+      break;
+  }
+  return std::nullopt;
 }
 
 std::string without_padding(std::string text) {
@@ -85,20 +101,13 @@ const Hdf5Attribute& StoredGroup::value(const std::string& name) const {
   return found->second;
 }
 
-double StoredGroup::number(const std::string& name) const {
+base::Finite StoredGroup::number(const std::string& name, base::Interval within) const {
   const Hdf5Attribute& found = value(name);
-  switch (found.values.type) {
-    case Type::kFloat32:
-      return static_cast<double>(first<float>(found));
-    case Type::kFloat64:
-      return first<double>(found);
-    case Type::kInteger64:
-      return static_cast<double>(first<std::int64_t>(found));
-    case Type::kByte:
-    case Type::kText:
-      break;
-  }
-  fail(name, "it is no number");
+  const std::optional<double> stored = number_in(found);
+  if (!stored) fail(name, "it is no number");
+  if (const auto number = within.find(*stored)) return *number;
+  fail(name,
+       fmt::format("it is {}, not a number from {} to {}", *stored, within.low(), within.high()));
 }
 
 std::int64_t StoredGroup::integer(const std::string& name) const {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/plausible.h"
 #include "io/hdf5/hdf5_objects.h"
 #include "io/saving/positioned_file.h"
 
@@ -28,7 +29,7 @@ class StoredGroup {
   bool has_attribute(const std::string& name) const;
   std::vector<std::string> names() const;  ///< names of groups and arrays, sorted
 
-  double number(const std::string& name) const;
+  base::Finite number(const std::string& name, base::Interval within) const;
   std::int64_t integer(const std::string& name) const;
   std::string text(const std::string& name) const;
 

@@ -51,7 +51,7 @@ std::filesystem::path write_some(const ScratchDirectory& scratch) {
 void read_some(const std::filesystem::path& path) {
   const StoredGroup root = Hdf5Reader(path).root();
   root.text("name");
-  root.number("length");
+  root.number("length", 10);
   root.integer("count");
   root.read_array<double>("doubles");
   const StoredGroup group = root.group("group");
@@ -64,8 +64,8 @@ TEST(Hdf5Reader, ReadsWhatHdf5FileWrites) {
   const ScratchDirectory scratch;
   const StoredGroup root = Hdf5Reader(write_some(scratch)).root();
   EXPECT_EQ(root.text("name"), "a specimen");
-  EXPECT_EQ(root.number("length"), 2.5);
-  EXPECT_EQ(root.number("count"), -7.0);
+  EXPECT_EQ(root.number("length", 10), 2.5);
+  EXPECT_EQ(root.number("count", 10), -7.0);
   EXPECT_EQ(root.integer("count"), -7);
   EXPECT_EQ(root.read_array<double>("doubles"), (std::vector<double>{1, 2, 3}));
   EXPECT_EQ(root.names(), (std::vector<std::string>{"doubles", "group"}));
@@ -83,8 +83,9 @@ TEST(Hdf5Reader, NamesWhatIsMissingOrOfAnotherKind) {
     EXPECT_NE(said.find(item), std::string::npos) << said;
     EXPECT_NE(said.find("some.h5"), std::string::npos) << said;
   };
-  refuses("width", [&] { root.number("width"); });
-  refuses("name", [&] { root.number("name"); });
+  refuses("width", [&] { root.number("width", 10); });
+  refuses("name", [&] { root.number("name", 10); });
+  refuses("2.5", [&] { root.number("length", 2); });
   refuses("length", [&] { root.text("length"); });
   refuses("length", [&] { root.integer("length"); });
   refuses("length", [&] { root.group("length"); });

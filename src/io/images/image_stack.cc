@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "base/checked_size.h"
 #include "io/images/tiff_stack.h"
 #include "io/images/view_images.h"
 #include "io/tables/mdoc_images.h"
@@ -85,11 +86,8 @@ std::shared_ptr<const ImageStack> image_stack_in_memory(std::vector<float> value
                                                         std::vector<double> tilt_deg,
                                                         double pixel_size_A) {
   const auto count = static_cast<std::int64_t>(tilt_deg.size());
-  constexpr std::int64_t kLargestSide = std::int64_t{1} << 24;
-  const bool has_sides =
-      width >= 1 && height >= 1 && width <= kLargestSide && height <= kLargestSide;
-  if (count == 0 || !has_sides || std::ssize(values) % (width * height) != 0 ||
-      std::ssize(values) / (width * height) != count) {
+  if (count == 0 || width == 0 || height == 0 ||
+      !(base::CheckedSize(width) * height * count).is(values.size())) {
     throw Error(fmt::format(
         "{} values are not {} images of {} × {} pixels: give one value a pixel and one tilt angle "
         "an image",

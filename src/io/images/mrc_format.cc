@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "base/check.h"
+#include "base/checked_size.h"
 #include "base/plausible.h"
 #include "tomofield/error.h"
 
@@ -222,20 +223,15 @@ MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name
 }
 
 std::int64_t expected_file_bytes(const MrcHeader& header, const std::string& name) {
-  std::int64_t bytes = 0;
-  const bool overflows =
-      __builtin_mul_overflow(header.nx * header.ny, header.nz, &bytes) ||
-      __builtin_mul_overflow(bytes, static_cast<std::int64_t>(bytes_per_value(header.mode)),
-                             &bytes) ||
-      __builtin_add_overflow(
-          bytes, static_cast<std::int64_t>(kMrcHeaderBytes) + header.extended_header_bytes, &bytes);
-  if (overflows) {
-    throw Error(
-        fmt::format("'{}': {} × {} × {} values are more than any file can hold; the header "
-                    "is damaged or this is no MRC file",
-                    name, header.nx, header.ny, header.nz));
-  }
-  return bytes;
+  const base::CheckedSize values = base::CheckedSize(header.nx) * header.ny * header.nz;
+  const auto bytes =
+      (values * bytes_per_value(header.mode) + kMrcHeaderBytes + header.extended_header_bytes)
+          .find();
+  if (bytes) return *bytes;
+  throw Error(
+      fmt::format("'{}': {} × {} × {} values are more than any file can hold; the header "
+                  "is damaged or this is no MRC file",
+                  name, header.nx, header.ny, header.nz));
 }
 
 namespace {

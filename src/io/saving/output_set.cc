@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -27,8 +28,25 @@ std::atomic<OutputSet*> g_active{nullptr};
   throw Error(fmt::format("cannot replace '{}': {}", target.string(), std::strerror(error)));
 }
 
+// Returns true if a file has another name now. A server of NFS may have renamed it although its
+// answer was lost and the call fails, so a failure counts only if the file is still where it was.
 bool rename_file(const fs::path& from, const fs::path& to) {
-  return std::rename(from.c_str(), to.c_str()) == 0;
+  struct stat before {};
+  struct stat after {};
+  const bool is_known = ::lstat(from.c_str(), &before) == 0;
+  if (std::rename(from.c_str(), to.c_str()) == 0) return true;
+  const int error = errno;
+  const bool is_there = is_known && ::lstat(to.c_str(), &after) == 0 &&
+                        after.st_ino == before.st_ino && after.st_dev == before.st_dev;
+  const bool is_gone = ::lstat(from.c_str(), &before) != 0 && errno == ENOENT;
+  errno = error;
+  return is_there && is_gone;
+}
+
+// Returns true if a file has a second name now, as rename_file() does.
+bool link_file(const fs::path& file, const fs::path& second) {
+  std::error_code absent;
+  return ::link(file.c_str(), second.c_str()) == 0 || fs::equivalent(file, second, absent);
 }
 
 // Flushes a folder, so that a power cut does not undo a rename. Some file systems cannot do that;
@@ -62,7 +80,7 @@ struct OutputSet::Change {
     errno = EISDIR;
     if (fs::is_directory(status)) throw_cannot_replace(target);
     change.old = unused_temporary_name(target);
-    const bool has_second_name = !is_removal && ::link(target.c_str(), change.old.c_str()) == 0;
+    const bool has_second_name = !is_removal && link_file(target, change.old);
     if (!has_second_name && !rename_file(target, change.old)) throw_cannot_replace(target);
     return change;
   }

@@ -6,17 +6,37 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <mutex>
 #include <string>
 #include <system_error>
 #include <utility>
 
+#include "base/utf8.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
 namespace {
+
+std::mutex g_mutex;  // guards writing the two below
+std::array<char, 8192> g_fault_text;
+std::atomic<std::size_t> g_fault_length{0};
+
+// Makes the line ready that scratch_fault() returns, because its handler cannot.
+void prepare_fault(const char* noun, const std::filesystem::path& directory) {
+  const std::string line = fmt::format(
+      "\ntomofield: the scratch file with {} in '{}' cannot be kept: the file system there has "
+      "less "
+      "room than it said, or has failed; free some space there, or write to another folder\n",
+      noun, base::printable(directory.string()));
+  const std::lock_guard guard(g_mutex);
+  g_fault_length = 0;
+  g_fault_length = line.copy(g_fault_text.data(), g_fault_text.size());
+}
 
 void* map_memory(std::size_t bytes, const char* noun) {
   void* memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -33,6 +53,7 @@ void* map_file(std::size_t bytes, const char* noun, const std::filesystem::path&
                             directory.string(), std::strerror(errno), noun, bytes));
   }
   unlink(name.c_str());
+  prepare_fault(noun, directory);
   void* memory = MAP_FAILED;
   int code = posix_fallocate(fd, 0, static_cast<off_t>(bytes));
   if (code == 0) {
@@ -48,6 +69,8 @@ void* map_file(std::size_t bytes, const char* noun, const std::filesystem::path&
 }
 
 }  // namespace
+
+std::string_view scratch_fault() { return {g_fault_text.data(), g_fault_length}; }
 
 std::filesystem::path scratch_directory(const std::filesystem::path& output) {
   std::error_code ignored;  // ScratchMemory says what is wrong with a folder that it needs

@@ -2,12 +2,18 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <string_view>
 
 namespace tomofield::io {
 
 /// Returns the folder for scratch files of a run that writes `output`: the folder of the output,
 /// which has room, or that of the system if no file is written.
 std::filesystem::path scratch_directory(const std::filesystem::path& output);
+
+/// Returns a line that says why SIGBUS came, if it came because the last scratch file lost its
+/// place on the disk: some file systems reserve room that they do not have. Returns an empty text
+/// if there has been no scratch file. A handler of signals may call it.
+std::string_view scratch_fault();
 
 /// Zeroed bytes for what is needed during one run. A small array lies in memory, a large one in an
 /// unlinked file that the kernel pages, so that it may be larger than the memory.

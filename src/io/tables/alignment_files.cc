@@ -93,7 +93,7 @@ std::vector<ImodTransform> read_imod_transforms(const std::filesystem::path& pat
     for (std::size_t i = 0; is_valid && i < values.size(); ++i) {
       const auto value = parse_number(words[i], base::kLargestPosition_px);
       is_valid = value.has_value();
-      values[i] = value.value_or(0.0);
+      values[i] = value ? double{*value} : 0.0;
     }
     if (!is_valid)
       throw_line_error(path, line, "a transform of six numbers: A11 A12 A21 A22 DX DY");

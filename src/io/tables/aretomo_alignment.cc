@@ -93,7 +93,7 @@ AreTomoRow parse_row(const std::filesystem::path& path, const TextLine& line, bo
                       path.string(), line.number, name, words[index], largest, largest,
                       name == "TILT" ? ": correct it, or give the angles with --tlt" : ""));
     }
-    used[i] = number.value_or(0.0);
+    used[i] = number ? double{*number} : 0.0;
   }
   return {*section, line.number, used[0], used[1], used[2], used[3], used[4]};
 }

@@ -54,7 +54,7 @@ Row parse_row(const std::filesystem::path& path, const TextLine& line) {
   for (std::size_t i = 0; is_valid && i < values.size(); ++i) {
     const auto value = parse_number(words[i], kLargest[i]);
     is_valid = value.has_value();
-    values[i] = value.value_or(0.0);
+    values[i] = value ? double{*value} : 0.0;
   }
   const auto [number, u_A, v_A, angle_deg, phase_rad] = values;
   if (!is_valid || number < 1 || number != std::floor(number)) {

@@ -88,7 +88,7 @@ Entry parse_entry(const std::filesystem::path& path, const TextLine& line, const
   for (std::size_t i = 0; is_valid && i < num_words; ++i) {
     const auto value = parse_number(words[i], kLargestDefocus_A / kAngstroms_in_nm);
     is_valid = value.has_value();
-    values[i] = value.value_or(0.0);
+    values[i] = value ? double{*value} : 0.0;
   }
   const auto first = static_cast<std::int64_t>(values[0]),
              last = static_cast<std::int64_t>(values[1]);

@@ -86,9 +86,9 @@ std::vector<TextLine> read_text_lines(const std::filesystem::path& path) {
   return lines;
 }
 
-std::optional<double> parse_number(std::string_view word, double largest) {
+std::optional<base::Finite> parse_number(std::string_view word, base::Interval within) {
   const auto value = parse_whole<double>(word);
-  return value && base::is_plausible(*value, largest) ? value : std::nullopt;
+  return value ? within.find(*value) : std::nullopt;
 }
 
 std::optional<std::int64_t> parse_integer(std::string_view word) {

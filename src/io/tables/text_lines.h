@@ -32,10 +32,11 @@ std::vector<TextLine> read_text_lines(const std::filesystem::path& path);
 std::string_view trim(std::string_view text);
 std::vector<std::string_view> split_words(std::string_view text);
 
-/// Parses a whole word as a finite number from −`largest` to `largest`. Returns nothing if the word
-/// is another number or none, or if any character is left over. All readers of text files get their
-/// numbers from here, so none of them ever sees a value that is not finite or not plausible.
-std::optional<double> parse_number(std::string_view word, double largest = base::kLargestNumber);
+/// Parses a whole word as a number within an interval. Returns nothing if the word is another
+/// number or none, or if any character is left over. All readers of text files get their numbers
+/// from here.
+std::optional<base::Finite> parse_number(std::string_view word,
+                                         base::Interval within = base::kLargestNumber);
 /// Parses a whole word as an integer from −1e9 to 1e9.
 std::optional<std::int64_t> parse_integer(std::string_view word);
 

@@ -139,6 +139,21 @@ TEST(ViewTable, ReadsTheXmlOfWarp) {
   EXPECT_EQ(table.defocus_hand, 1);
 }
 
+TEST(ViewTable, RefusesADoseBelowZero) {
+  const ScratchDirectory scratch;
+  expect_parts(refusal_of_views(scratch.write(
+                   "TS.star", kRelionHead + "a.mrc None 0 -60 85 0 0 -3 40000 39000 -45 0\n")),
+               {"TS.star", "row 1", "-3", "rlnMicrographPreExposure"});
+  expect_parts(
+      refusal_of_views(scratch.write("TS.tomostar",
+                                     "\ndata_\n\nloop_\n_wrpMovieName #1\n_wrpAngleTilt #2\n"
+                                     "_wrpDose #3\na.eer 45 3\nb.eer 42 -4.5\n")),
+      {"TS.tomostar", "row 2", "-4.5", "wrpDose"});
+  std::string xml = kSeriesXml + "</TiltSeries>";
+  xml.replace(xml.find("3\n0</Dose>"), 1, "-3");
+  expect_parts(refusal_of_views(scratch.write("TS.xml", xml)), {"TS.xml", "-3", "view 1"});
+}
+
 TEST(ViewTable, KnowsTheHandOfTheDefocusOfWarp) {
   const ScratchDirectory scratch;
   const auto hand = [&](const std::string& attribute) {

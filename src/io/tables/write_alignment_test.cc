@@ -96,7 +96,7 @@ TEST(WriteAlignment, AreTomosAlignmentIsReadBack) {
   EXPECT_EQ(read.alpha_offset_deg, written.alpha_offset_deg);
   EXPECT_EQ(read.beta_offset_deg, written.beta_offset_deg);
   EXPECT_EQ(read.thickness, written.thickness);
-  EXPECT_EQ(read.num_local_rows, 0);
+  EXPECT_TRUE(read.patches.empty());
   ASSERT_EQ(read.rows.size(), written.rows.size());
   for (std::size_t i = 0; i < read.rows.size(); ++i) {
     const AreTomoRow &a = read.rows[i], &b = written.rows[i];

@@ -8,7 +8,7 @@
 namespace tomofield::tilt_series {
 namespace {
 
-constexpr double kWidth = 120, kHeight = 90;
+constexpr double kViewWidth = 120, kViewHeight = 90;
 
 // Local alignments on 2 × 2 parts of two sections, whose second one is moved.
 io::ImodLocal some_local() {
@@ -27,7 +27,7 @@ TEST(LocalAlignment, AWarpUndoesWhatTheOtherProgramSays) {
   const LocalPlace place = [](double x, double y) {
     return geometry::ViewWarp::Vector{x + 2.0 + 0.02 * y, y - 1.0 + 0.01 * x};
   };
-  const FittedWarp fitted = warp_through(kWidth, kHeight, place);
+  const FittedWarp fitted = warp_through(kViewWidth, kViewHeight, place);
   // The pixel at p shows what belongs at p + d(p), so place(p + d(p)) = p.
   for (const auto& [x, y] : {std::pair{-50.0, 40.0}, std::pair{13.0, -7.0}}) {
     const auto d = fitted.warp.displacement(x, y);
@@ -41,15 +41,15 @@ TEST(LocalAlignment, AWarpUndoesWhatTheOtherProgramSays) {
 
 TEST(LocalAlignment, PatchesOfAreTomoAreWeighedByTheirDistance) {
   const std::vector<io::AreTomoPatch> patches{{-30, 0, 1.0, 0.0}, {30, 0, 0.0, 2.0}};
-  const LocalPlace place = place_of_aretomo(patches, 90.0, kWidth, kHeight);
+  const LocalPlace place = place_of_aretomo(patches, 90.0, kViewWidth, kViewHeight);
   // R(90°) turns (0, -30) into (30, 0), which is the place of the second patch.
-  const double weight = std::exp(-100.0 * std::pow(60 / kWidth, 2));
+  const double weight = std::exp(-100.0 * std::pow(60 / kViewWidth, 2));
   const double lx = weight / (1 + weight), ly = 2 / (1 + weight);
   const auto p = place(0, -30);
   // The shift is in the raw image and is turned back: (lx, ly) becomes (ly, -lx).
   EXPECT_NEAR(p[0], ly, 1e-12);
   EXPECT_NEAR(p[1], -30 - lx, 1e-12);
-  const auto alone = place_of_aretomo({}, 90.0, kWidth, kHeight)(3, 4);
+  const auto alone = place_of_aretomo({}, 90.0, kViewWidth, kViewHeight)(3, 4);
   EXPECT_EQ(alone, (geometry::ViewWarp::Vector{3, 4}));
 }
 
@@ -60,7 +60,7 @@ TEST(LocalAlignment, PartsOfImodAreInterpolated) {
   local.parts[2 * 1 + 1].tilt_deg = 2.0;               // row 0, column 1
   const ViewAngles level{};
   const auto at = [&](std::int64_t section, double x, double y, double scale) {
-    return place_of_imod(local, section, level, level, kWidth, kHeight, scale)(x, y);
+    return place_of_imod(local, section, level, level, kViewWidth, kViewHeight, scale)(x, y);
   };
   // Pixel 20.5 of 120 that count from 1 lies 40 left of the middle, pixel 15.5 of 90 lies 30 below.
   EXPECT_NEAR(at(1, -40, -30, 1)[0], -36, 1e-12);
@@ -80,7 +80,7 @@ TEST(LocalAlignment, PartsOfImodAreThoseOfTheUntiltedSpecimen) {
   io::ImodLocal local = some_local();
   local.parts[2 * 1 + 1].transform.shift_x_px = 4.0;  // the right lower part
   const ViewAngles tilted{.tilt_deg = 60};
-  const auto place = place_of_imod(local, 1, tilted, tilted, kWidth, kHeight, 1);
+  const auto place = place_of_imod(local, 1, tilted, tilted, kViewWidth, kViewHeight, 1);
   EXPECT_NEAR(place(20, -30)[0], 24, 1e-9);  // X = 20 / cos 60° is the column of that part
 }
 
