@@ -11,6 +11,7 @@ import readme_page
 import start_folders
 
 PAGE = os.path.join(readme_page.PROJECT, "docs", "start.md")
+REPORT = "etomo_report.html"
 SIZE = 128  # pixels of a view, for the pictures
 
 
@@ -23,10 +24,19 @@ def commands(text=None):
 
 
 def pictures(text=None):
-    """Returns {picture of the page: the file that a command writes}, by the name of its results."""
+    """Returns {picture of the page: the file that a command writes}, by the name of its results: its
+    section, or the report whose beginning start_report.png shows."""
     text = readme_page.read(PAGE) if text is None else text
-    return {f"docs/{path}": f"{name}_xy.png"
+    return {f"docs/{path}": REPORT if name == "report" else f"{name}_xy.png"
             for path, name in re.findall(r"\]\((results/start_(\w+)\.png)\)", text)}
+
+
+def photograph(page, picture):
+    """Draws the beginning of an HTML page as Chromium shows it."""
+    subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
+                    "--window-size=1000,1250", "--virtual-time-budget=4000",
+                    f"--screenshot={picture}", f"file://{os.path.abspath(page)}"],
+                   check=True, capture_output=True)
 
 
 def make(program, folder):
@@ -36,5 +46,6 @@ def make(program, folder):
         more = ["--overwrite"] if "-o" in words else []
         subprocess.run([os.path.abspath(program), *words, *more], cwd=folder, check=True)
     for picture, made in pictures().items():
-        shutil.copy(os.path.join(folder, made), os.path.join(readme_page.PROJECT, picture))
+        draw = photograph if made == REPORT else shutil.copy
+        draw(os.path.join(folder, made), os.path.join(readme_page.PROJECT, picture))
     return list(pictures())

@@ -38,12 +38,14 @@ def test_the_page_has_its_commands_and_a_picture_of_each():
     made = [words[words.index("-o") + 1] for words in start_page.commands() if "-o" in words]
     assert [name.removesuffix(".mrc") for name in made if "_" not in name] == [
         "etomo", "aretomo", "relion", "serialem"]
-    assert len(start_page.pictures()) == 4
+    assert list(start_page.pictures().values()) == [
+        start_page.REPORT, *(f"{name}_xy.png" for name in ("etomo", "aretomo", "relion", "serialem"))]
     with open(os.path.join(PROJECT, "bench/gate_expected/readme.json"), encoding="utf-8") as file:
         assert set(start_page.pictures()) <= set(json.load(file)["pictures"])
 
 
 def test_the_commands_write_the_files_that_the_page_names(folder):
+    assert all(os.path.exists(os.path.join(folder, made)) for made in start_page.pictures().values())
     text = readme_page.read(start_page.PAGE)
     named = set(re.findall(r"`((?:etomo|aretomo|relion|serialem)[_.][\w.]+)`", text))
     assert {"aretomo.zarr", "relion.star", "serialem_align.xf", "serialem_align.aln"} <= named
