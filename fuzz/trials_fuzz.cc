@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "fuzz_input.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "tune/trial_file.h"
 #include "tune/trial_record.h"
 #include "tune/tuning.h"

@@ -7,8 +7,7 @@
 #include <numeric>
 #include <vector>
 
-#include "base/stop_requested.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 #include "base/threads/parallel.h"
 #include "measurement/prepare.h"
 #include "objective/constants.h"

@@ -15,7 +15,7 @@
 #include "align/start/correlation_start.h"
 #include "align/trial.h"
 #include "align/unalike.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "measurement/prepare.h"

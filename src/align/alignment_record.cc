@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "base/plausible.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "tomofield/error.h"
 
 namespace tomofield::alignment {
@@ -47,7 +47,7 @@ LocalRecord local_record(const Alignment& found) {
 
 // ----------------------------------------------------------------- writing
 
-json gain_json(const MeanGain& gain) {
+json gain_json(const base::MeanGain& gain) {
   return {{"mean", gain.mean}, {"standard_error", gain.error}};
 }
 
@@ -139,7 +139,7 @@ std::array<double, 2> positions_at(const json& object, const char* key) {
   return pair_at(object, key, -base::kLargestPosition_px, base::kLargestPosition_px);
 }
 
-MeanGain gain_at(const json& object) {
+base::MeanGain gain_at(const json& object) {
   const json& gain = part(object, "gain");
   return {.mean = number_at(gain, "mean"), .error = number_at(gain, "standard_error")};
 }

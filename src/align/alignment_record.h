@@ -11,7 +11,6 @@
 #include "align/alignment.h"
 #include "align/freedoms.h"
 #include "align/joint_alignment.h"
-#include "align/start/slab_pose.h"
 #include "align/trial.h"
 #include "geometry/view_correction.h"
 #include "geometry/view_warp.h"
@@ -52,7 +51,7 @@ struct BeadRecord {
   std::int64_t num_beads = 0;
   double files_px = 0.0;                   ///< with the alignment of the files
   double before_px = 0.0, after_px = 0.0;  ///< with the new one, before and after beads were used
-  MeanGain gain = {};                      ///< BeadAlignment::gain
+  base::MeanGain gain = {};                ///< BeadAlignment::gain
   bool is_accepted = false;                ///< whether the new alignment uses them
 };
 

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "align/freedoms.h"
-#include "align/start/slab_pose.h"
 #include "base/progress.h"
 #include "distributed/communicator.h"
 #include "geometry/view_correction.h"
@@ -17,6 +16,19 @@
 #include "tomofield/options.h"
 
 namespace tomofield::alignment {
+
+/// Describes a slab in the tilted views.
+struct SlabPose {
+  double thickness_px = 0.0;  ///< in pixels of the images
+  double pitch_deg = 0.0;     ///< is added to all tilt angles: the slab lies level with them
+  /// Is subtracted from the x-axis tilts of all views: the slab lies level with them.
+  double x_tilt_deg = 0.0;
+};
+
+/// The most likely pose, and the standard error of each of its numbers.
+struct FoundPose {
+  SlabPose pose, error;
+};
 
 /// Describes how well a view agrees with the projection of the field that it was registered to
 /// last.

@@ -32,7 +32,7 @@ Comparison compare_errors(const std::vector<double>& before, const std::vector<d
   const auto n = static_cast<double>(std::max<std::size_t>(gains.size(), 1));
   comparison.before /= n;
   comparison.after /= n;
-  comparison.gain = mean_gain(gains);
+  comparison.gain = base::mean_gain(gains);
   return comparison;
 }
 

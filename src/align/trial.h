@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "align/joint_alignment.h"
-#include "align/mean_gain.h"
+#include "base/statistics.h"
 #include "distributed/communicator.h"
 #include "fit/fit.h"
 #include "geometry/view_correction.h"
@@ -54,7 +54,7 @@ class AlignmentTrial {
 /// Compares the errors of held-out views with two alignments.
 struct Comparison {
   double before = 0.0, after = 0.0;  ///< mean errors of the views that have one
-  MeanGain gain;                     ///< of the differences over the views
+  base::MeanGain gain;               ///< of the differences over the views
 };
 
 /// Compares two alignments by their errors in wide pixels if these differ by more than three

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "base/stop_requested.h"
+#include "base/progress.h"
 #include "shifted_series.h"
 
 namespace tomofield::alignment {

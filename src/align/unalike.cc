@@ -5,7 +5,7 @@
 #include <cstddef>
 
 #include "base/statistics.h"
-#include "geometry/tilt_order.h"
+#include "geometry/tilt_geometry.h"
 
 namespace tomofield::alignment {
 namespace {

@@ -3,8 +3,6 @@
 #include <mutex>
 #include <utility>
 
-#include "base/held_log.h"
-
 namespace tomofield::base {
 namespace {
 std::mutex g_mutex;

@@ -24,6 +24,9 @@ struct BaselineOptions {
   Method method;
   /// Corrects the views before, if there is a contrast transfer.
   microscope::CtfCorrection ctf_correction = microscope::CtfCorrection::kFlip;
+
+  /// Returns whether the scales of views are fitted, which the contrast decides unless it is given.
+  bool fits_view_scale() const;
 };
 
 /// Checks the options and the output files. Throws Error for options out of range, and if results

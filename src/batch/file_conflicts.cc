@@ -6,8 +6,8 @@
 #include <string>
 
 #include "batch/choice.h"
-#include "batch/faults.h"
 #include "batch/relion_table.h"
+#include "batch/series_list.h"
 #include "batch/slurm.h"
 #include "batch/state.h"
 #include "batch/summary.h"

@@ -13,12 +13,12 @@
 #include <utility>
 
 #include "base/log.h"
-#include "base/time_text.h"
+#include "base/progress.h"
 #include "batch/choice.h"
 #include "batch/csv.h"
 #include "batch/relion_table.h"
 #include "batch/state.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_lock.h"
 #include "io/saving/output_set.h"

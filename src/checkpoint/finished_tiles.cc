@@ -8,7 +8,7 @@
 
 #include "base/log.h"
 #include "base/trace.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "output/model_file.h"
 #include "output/output_paths.h"
 #include "tomofield/error.h"

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "tomofield/error.h"
 
 namespace tomofield::checkpoint {

@@ -11,7 +11,6 @@
 #include "base/utf8.h"
 #include "compare/grid.h"
 #include "io/json.h"
-#include "io/json_numbers.h"
 #include "output/output_paths.h"
 #include "tomofield/error.h"
 
@@ -26,18 +25,11 @@ constexpr const char* kAdvice =
 
 // Returns what `read` makes of a JSON file. Mistakes in the file are errors that name it.
 template <typename Read>
-auto read_json(const fs::path& path, Read&& read) {
-  const auto fail = [&](const std::string& why) {
-    return Error(fmt::format("'{}' is not what this comparison wrote ({}): {}", path.string(), why,
-                             kAdvice));
-  };
-  try {
-    return read(io::read_json(path));
-  } catch (const json::exception& fault) {
-    throw fail(io::fault_text(fault));
-  } catch (const Error& fault) {
-    throw fail(fault.what());
-  }
+auto read_json(const fs::path& path, const Read& read) {
+  return io::read_record(path, read, [&](const std::string& why) {
+    return fmt::format("'{}' is not what this comparison wrote ({}): {}", path.string(), why,
+                       kAdvice);
+  });
 }
 
 std::string command_text(const json& command) {

@@ -13,7 +13,7 @@
 #include "evaluate/box.h"
 #include "io/is_file.h"
 #include "io/saving/output_files.h"
-#include "io/saving/scratch_folder.h"
+#include "io/saving/output_folder.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 

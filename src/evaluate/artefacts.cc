@@ -62,14 +62,4 @@ Artefacts find_artefacts(const base::Volume& volume, const fs::path& path,
   return found;
 }
 
-nlohmann::json artefacts_json(const std::optional<double>& speckle,
-                              const std::optional<FaceJump>& faces) {
-  const auto value = [](const std::optional<double>& number) {
-    return number ? nlohmann::json(*number) : nlohmann::json(nullptr);
-  };
-  nlohmann::json jump = nullptr;
-  if (faces) jump = {{"both", faces->both}, {"x", value(faces->x)}, {"y", value(faces->y)}};
-  return {{"speckle", value(speckle)}, {"face_jump", jump}};
-}
-
 }  // namespace tomofield::evaluate

@@ -380,4 +380,13 @@ void realign(const tilt_series::TiltSeries& recorded,
   measurement.geometry.tilt_deg = corrected_tilts(recorded, corrections);
 }
 
+void require_pixels(std::int64_t width, std::int64_t height) {
+  constexpr std::int64_t kFewest = 8;
+  if (std::min(width, height) >= kFewest) return;
+  throw Error(
+      fmt::format("views of {} × {} pixels show nothing: they need at least {} along both sides, "
+                  "after --bin; give a smaller --bin, or check the size in the stack's header",
+                  width, height, kFewest));
+}
+
 }  // namespace tomofield::measurement

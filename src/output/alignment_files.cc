@@ -8,7 +8,7 @@
 
 #include "base/check.h"
 #include "base/log.h"
-#include "geometry/imod_transform.h"
+#include "geometry/raw_from_aligned.h"
 #include "io/saving/output_set.h"
 #include "io/tables/write_alignment.h"
 

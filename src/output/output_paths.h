@@ -19,7 +19,7 @@ struct OutputPaths {
   std::filesystem::path held_out_picture;  ///< if views are held out
   std::filesystem::path choice_picture;    ///< of the trials, if there are any
   std::filesystem::path dial_picture;      ///< what --denoise does (report/denoise_dial.h)
-  std::filesystem::path prior_picture;     ///< what the learned prior does (report/prior_picture.h)
+  std::filesystem::path prior_picture;     ///< what the learned prior does (report/pictures.h)
   std::filesystem::path trials;            ///< trials of --tune (JSON)
   std::filesystem::path alignment;         ///< of --align, from which a run resumes (JSON)
   /// The files of an aligned series for IMOD and AreTomo begin with this.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <filesystem>
+
 #include "field/sampling/sample_box.h"
 #include "output/model_file.h"
 
@@ -11,6 +13,11 @@ struct Levelling {
   double pitch_deg = 0.0;   ///< is added to all tilt angles
   double x_tilt_deg = 0.0;  ///< is subtracted from the x-axis tilts of all views
 };
+
+/// Returns how far the specimen of a model was found to be from level by the alignment of its
+/// run, which lies beside the model (NAME_align.json of NAME.h5). Throws Error if there is none, or
+/// if it could not tell.
+Levelling found_levelling(const std::filesystem::path& model);
 
 /// The place of a volume in the field of a model. A point P of the volume lies in the field at
 ///

@@ -7,7 +7,7 @@
 #include "distributed/communicator.h"
 #include "fit/stages.h"
 #include "options/run_options.h"
-#include "plan/tiles.h"
+#include "plan/tile_plan.h"
 #include "tilt_series/planned_series.h"
 #include "tomofield/options.h"
 

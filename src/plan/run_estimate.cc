@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "align/alignment.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 #include "fit/stages.h"
 #include "io/saving/scratch_memory.h"
 #include "measurement/prepare.h"

@@ -16,7 +16,7 @@
 
 #include "base/xxhash64.h"
 #include "io/images/image_stack.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/text_lines.h"
 #include "io/tables/view_table.h"

@@ -14,19 +14,20 @@
 #include <utility>
 #include <vector>
 
+#include "base/progress.h"
 #include "base/range.h"
-#include "base/stopwatch.h"
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "checkpoint/checkpoint.h"
 #include "compact/budget.h"
 #include "compact/compress.h"
 #include "evaluate/artefacts.h"
+#include "evaluate/evaluation_record.h"
 #include "io/json.h"
 #include "io/saving/output_set.h"
 #include "option_table/setting.h"
-#include "options/denoise_factor.h"
-#include "output/metrics.h"
+#include "options/run_options.h"
+#include "output/metrics_record.h"
 #include "output/output_paths.h"
 #include "output/volume.h"
 #include "reconstruct/run_files.h"
@@ -36,6 +37,7 @@
 #include "tomofield/error.h"
 #include "tune/trial_record.h"
 #include "verdict/judge.h"
+#include "verdict/verdict_record.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -56,7 +58,7 @@ nlohmann::json held_out_json(const fit::Fit& fit, const measurement::Measurement
                              const std::optional<measurement::ViewErrors>& errors) {
   if (!errors) return nullptr;
   nlohmann::json json =
-      measurement::report_held_out(*errors, series.geometry.tilt_deg, options.fit.patience > 0);
+      output::report_held_out(*errors, series.geometry.tilt_deg, options.fit.patience > 0);
   json["error_by_epoch"] = fit.progress().held_out_error;
   return json;
 }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/log.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 #include "base/system/memory.h"
 #include "base/trace.h"
 #include "checkpoint/finished_tiles.h"
@@ -18,9 +18,10 @@
 #include "compact/compress.h"
 #include "compact/decoded_field.h"
 #include "fit/fit.h"
-#include "options/denoise_factor.h"
+#include "options/run_options.h"
 #include "reconstruct/run_fit.h"
 #include "tomofield/error.h"
+#include "verdict/verdict_record.h"
 
 namespace tomofield::reconstruction {
 namespace {

@@ -12,11 +12,12 @@
 #include "base/statistics.h"
 #include "base/threads/parallel.h"
 #include "base/trace.h"
-#include "field/sampling/middle_plane.h"
+#include "field/sampling/sample_box.h"
 #include "io/images/png.h"
 #include "report/canvas.h"
 #include "report/contrast.h"
 #include "report/slice.h"
+#include "report/trial_sections.h"
 
 namespace tomofield::report {
 namespace {
@@ -80,6 +81,17 @@ std::uint8_t grey_of(double value, double black, double range) {
   if (!std::isfinite(value) || !(range > 0)) return 0;
   return static_cast<std::uint8_t>(
       std::lround(std::clamp((value - black) / range, 0.0, 1.0) * 255.0));
+}
+
+// Returns what `with` has more than `without`, around the middle of the contrast of that: where
+// nothing changes, it is a middle grey.
+tune::Section difference_of(const tune::Section& with, const tune::Section& without) {
+  tune::Section difference = with;
+  const Contrast contrast = contrast_of(without.values);
+  const auto middle = static_cast<float>((contrast.black + contrast.white) / 2);
+  for (std::size_t i = 0; i < difference.values.size(); ++i)
+    difference.values[i] += middle - without.values[i];
+  return difference;
 }
 
 }  // namespace
@@ -197,6 +209,19 @@ void write_held_out_picture(const measurement::PredictedView& view,
     }
   }
   io::write_png_grey(path, width, view.height, pixels);
+}
+
+void write_prior_picture(const tune::TunedFit& tuned, double output_scale,
+                         const std::filesystem::path& path) {
+  std::vector<CaptionedSection> shown;
+  if (!tuned.last_trials.empty() && !tuned.last_trials.front().section.values.empty()) {
+    const tune::Section& without = tuned.last_trials.front().section;
+    const tune::Section& with = tuned.last_trials.back().section;
+    shown = {{without, "Total variation alone"},
+             {with, "With the learned prior"},
+             {difference_of(with, without), "What the prior adds"}};
+  }
+  draw_sections(shown, 0, output_scale, path);
 }
 
 }  // namespace tomofield::report

@@ -9,6 +9,7 @@
 #include "output/output_paths.h"
 #include "report/curve_plot.h"
 #include "tilt_series/tilt_series.h"
+#include "tune/trial_settings.h"
 
 namespace tomofield::report {
 
@@ -51,5 +52,11 @@ void write_fsc_picture(const evaluate::Fsc& fsc, const std::filesystem::path& pa
 /// cannot be written.
 void write_held_out_picture(const measurement::PredictedView& view,
                             const std::filesystem::path& path);
+
+/// Draws what the learned prior changes: a section of the trial without it, of the trial with it,
+/// and their difference (trial_sections.h). Removes the file and draws nothing if the trials have
+/// no sections, as those that a resumed run reads.
+void write_prior_picture(const tune::TunedFit& tuned, double output_scale,
+                         const std::filesystem::path& path);
 
 }  // namespace tomofield::report

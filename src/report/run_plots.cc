@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "base/statistics.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "report/choice_plot.h"
 #include "report/curve_plot.h"
 #include "report/pictures.h"

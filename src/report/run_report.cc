@@ -12,7 +12,7 @@
 #include "base/trace.h"
 #include "base/version.h"
 #include "io/images/mrc.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "report/alignment_plot.h"
 #include "report/embedded_volume.h"
 #include "report/html.h"

@@ -6,8 +6,6 @@
 
 #include "distributed/communicator.h"
 #include "geometry/view_correction.h"
-#include "tilt_series/masks/bead_spot.h"
-#include "tilt_series/masks/mask_disc.h"
 #include "tilt_series/masks/mask_metrics.h"
 #include "tilt_series/planned_series.h"
 

@@ -6,12 +6,11 @@
 #include <optional>
 #include <vector>
 
-#include "base/held_log.h"
+#include "base/log.h"
 #include "distributed/communicator.h"
 #include "geometry/raw_from_aligned.h"
 #include "io/images/image_stack.h"
 #include "tilt_series/image.h"
-#include "tilt_series/series_options.h"
 #include "tilt_series/series_plan.h"
 
 namespace tomofield::tilt_series {

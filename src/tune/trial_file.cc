@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "io/json.h"
-#include "io/json_numbers.h"
 #include "tomofield/error.h"
 #include "tune/trial_record.h"
 

@@ -12,7 +12,7 @@
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/field_artefacts.h"
-#include "field/sampling/middle_plane.h"
+#include "field/sampling/sample_box.h"
 #include "measurement/background.h"
 #include "measurement/patch_errors.h"
 #include "measurement/undecided_beads.h"

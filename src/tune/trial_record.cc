@@ -7,7 +7,7 @@
 
 #include "base/enum_names.h"
 #include "base/plausible.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "kernels/spikes.h"
 #include "tomofield/error.h"
 

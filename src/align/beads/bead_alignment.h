@@ -6,7 +6,7 @@
 
 #include "align/freedoms.h"
 #include "align/joint_alignment.h"
-#include "align/mean_gain.h"
+#include "base/statistics.h"
 #include "distributed/communicator.h"
 #include "geometry/view_correction.h"
 
@@ -35,7 +35,7 @@ struct BeadAlignment {
   /// count less.
   double files_px = 0.0, before_px = 0.0, after_px = 0.0;
   /// The part by which the squared distances fall, over beads that do not decide about the steps.
-  MeanGain gain;
+  base::MeanGain gain;
 };
 
 /// Finds the steps after `corrections` with which each bead keeps its place in the specimen best:

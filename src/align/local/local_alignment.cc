@@ -15,7 +15,7 @@
 #include "base/trace.h"
 #include "fit/fit.h"
 #include "fit/stages.h"
-#include "geometry/tilt_order.h"
+#include "geometry/tilt_geometry.h"
 
 namespace tomofield::alignment {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "align/mean_gain.h"
+#include "base/statistics.h"
 
 namespace tomofield::alignment {
 namespace {
@@ -138,7 +138,7 @@ std::vector<ViewWarp> motion_that_pays(std::span<const LocalRegistration> views)
   std::vector<double> gains;
   for (const LocalRegistration& view : views) gains.push_back(view.gain());
   std::vector<ViewWarp> motion;
-  if (!mean_gain(gains).exceeds(kSure)) return motion;
+  if (!base::mean_gain(gains).exceeds(kSure)) return motion;
   for (const LocalRegistration& view : views) motion.push_back(view.solve({}));
   return motion;
 }

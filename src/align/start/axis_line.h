@@ -4,7 +4,7 @@
 #include <map>
 #include <vector>
 
-#include "align/mean_gain.h"
+#include "base/statistics.h"
 
 namespace tomofield::alignment {
 
@@ -33,7 +33,7 @@ class AxisLine {
 
  private:
   const std::vector<double>& at(double axis_deg);
-  MeanGain slope(double axis_deg, double step_deg);
+  base::MeanGain slope(double axis_deg, double step_deg);
 
   Residuals residuals_;
   double standard_errors_;

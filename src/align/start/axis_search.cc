@@ -11,7 +11,6 @@
 #include "align/start/axis_line.h"
 #include "base/log.h"
 #include "base/progress.h"
-#include "base/stopwatch.h"
 #include "base/trace.h"
 #include "fit/fit.h"
 

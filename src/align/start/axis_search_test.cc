@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "base/stop_requested.h"
+#include "base/progress.h"
 #include "shifted_series.h"
 
 namespace tomofield::alignment {

@@ -9,7 +9,7 @@
 
 #include "base/statistics.h"
 #include "base/threads/parallel.h"
-#include "geometry/tilt_order.h"
+#include "geometry/tilt_geometry.h"
 #include "kernels/lanes.h"
 
 namespace tomofield::alignment {

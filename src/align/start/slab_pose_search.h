@@ -8,8 +8,8 @@
 
 #include <Eigen/Core>
 
+#include "align/joint_alignment.h"
 #include "align/registration.h"
-#include "align/start/slab_pose.h"
 
 namespace tomofield::alignment {
 

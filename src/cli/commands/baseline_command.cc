@@ -13,7 +13,6 @@
 #include "cli/commands/run_reconstruction.h"
 #include "cli/commands/tensorf_command.h"
 #include "cli/options/common_options.h"
-#include "cli/options/enum_option.h"
 #include "cli/options/fit_options.h"
 #include "cli/options/help_formatter.h"
 #include "cli/options/number_checks.h"
@@ -24,8 +23,8 @@
 #include "distributed/communicator.h"
 #include "io/saving/output_set.h"
 #include "output/output_paths.h"
-#include "output/shared_options.h"
 #include "report/pictures.h"
+#include "tilt_series/series_plan.h"
 
 namespace tomofield::cli {
 namespace {
@@ -80,7 +79,8 @@ void print_summary(const baseline::BaselineSummary& summary) {
 // Checks the views and prints what a baseline would do.
 void rehearse(const baseline::BaselineOptions& options, const baseline::MethodFacts& method,
               const DryRun& dry_run) {
-  const tilt_series::MeasuredSeries series(output::series_options(options.files, options.shared));
+  const tilt_series::MeasuredSeries series(
+      tilt_series::series_options(options.files, options.shared));
   const Sizes sizes = print_plan(baseline::plan_baseline(series, options), options, method);
   if (dry_run.grid) write_grid(*dry_run.grid, sizes);
 }
@@ -88,7 +88,7 @@ void rehearse(const baseline::BaselineOptions& options, const baseline::MethodFa
 // Runs a baseline whose options have been checked.
 void run_method(const baseline::BaselineOptions& options, const baseline::MethodFacts& method,
                 const output::OutputPaths& paths) {
-  const tilt_series::TiltSeries series(output::series_options(options.files, options.shared));
+  const tilt_series::TiltSeries series(tilt_series::series_options(options.files, options.shared));
   print_plan(baseline::plan_baseline(series, options), options, method);
   io::OutputSet results;
   const baseline::BaselineSummary summary = baseline::run_baseline(

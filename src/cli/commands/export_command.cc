@@ -26,10 +26,9 @@
 #include "io/saving/output_lock.h"
 #include "io/saving/output_set.h"
 #include "output/box_bounds.h"
-#include "output/found_levelling.h"
 #include "output/model_file.h"
-#include "output/shared_options.h"
 #include "output/volume.h"
+#include "output/volume_frame.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {

@@ -21,8 +21,8 @@
 #include "io/saving/positioned_file.h"
 #include "io/tables/view_table.h"
 #include "output/model_file.h"
-#include "output/shared_options.h"
 #include "tilt_series/measured_series.h"
+#include "tilt_series/series_plan.h"
 
 namespace tomofield::cli {
 namespace {
@@ -237,7 +237,7 @@ void add_info_command(CLI::App& program) {
       "An MRC file, a model (.h5), or a tilt series: a stack, raw or aligned, or a project");
   add_help_all(*command);
   command->callback(
-      [choices] { print_info(output::series_options(choices->files, choices->options)); });
+      [choices] { print_info(tilt_series::series_options(choices->files, choices->options)); });
 }
 
 }  // namespace tomofield::cli

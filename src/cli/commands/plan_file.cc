@@ -4,8 +4,8 @@
 
 #include <string>
 
+#include "base/progress.h"
 #include "base/threads/parallel.h"
-#include "base/time_text.h"
 #include "base/utf8.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"

@@ -17,6 +17,9 @@ void remember_failure(bool has_failed) {
   if (has_failed && g_output_error == 0) g_output_error = errno;
 }
 
+volatile std::sig_atomic_t g_signal = 0;
+void remember_signal(int signal) { g_signal = signal; }
+
 }  // namespace
 
 void open_console() {
@@ -48,5 +51,15 @@ void say_text(std::string_view text) {
   std::fflush(stderr);
   std::clearerr(stderr);
 }
+
+void stop_on_signals(bool is_job) {
+  std::signal(SIGINT, remember_signal);
+  std::signal(SIGTERM, remember_signal);
+  if (is_job) std::signal(SIGUSR1, remember_signal);
+}
+
+bool stop_was_requested() { return g_signal != 0; }
+
+int stop_status() { return 128 + (g_signal != 0 ? g_signal : SIGTERM); }
 
 }  // namespace tomofield::cli

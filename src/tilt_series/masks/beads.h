@@ -8,8 +8,7 @@
 
 #include "distributed/communicator.h"
 #include "tilt_series/image.h"
-#include "tilt_series/masks/bead_spot.h"
-#include "tilt_series/masks/mask_disc.h"
+#include "tilt_series/masks/mask_metrics.h"
 
 namespace tomofield::tilt_series {
 

@@ -1,4 +1,4 @@
-#include "distributed/partition.h"
+#include "base/range.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "base/random.h"
 
-namespace tomofield::distributed {
+namespace tomofield::base {
 namespace {
 
 using base::Range;
@@ -50,4 +50,4 @@ TEST(Partition, APieceForEachPartEvenIfOneHasAllTheWork) {
 }
 
 }  // namespace
-}  // namespace tomofield::distributed
+}  // namespace tomofield::base

@@ -4,6 +4,7 @@
 
 #include "compact/compress.h"
 #include "fit/fit.h"
+#include "measurement/held_out.h"
 #include "measurement/prepare.h"
 
 namespace tomofield::output {
@@ -17,6 +18,11 @@ nlohmann::json mask_json(const measurement::Measurement& series);
 /// time.
 nlohmann::json metrics_json(const fit::Fit& fit, const measurement::Measurement& series,
                             double seconds);
+
+/// Logs the error of held-out views; returns it and that of each view. With `stopped_by_them` the
+/// same views decided when the fit stopped, and both say so.
+nlohmann::json report_held_out(const measurement::ViewErrors& error,
+                               const std::vector<double>& tilt_deg, bool stopped_by_them = false);
 
 /// Returns the metrics of a compact model, whose compression took `seconds`.
 nlohmann::json compact_json(const compact::CompressionReport& report, double seconds);

@@ -1,4 +1,4 @@
-#include "distributed/partition.h"
+#include "base/range.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "base/check.h"
 
-namespace tomofield::distributed {
+namespace tomofield::base {
 namespace {
 
 // Returns the first piece of a part. It leaves a piece at least to each part before and after it.
@@ -26,9 +26,9 @@ int first_piece(std::span<const double> work, int index, int count) {
 
 }  // namespace
 
-base::Range part_of(std::span<const double> work, int index, int count) {
+Range part_of(std::span<const double> work, int index, int count) {
   TOMOFIELD_CHECK(static_cast<int>(work.size()) >= count, "a piece for every part");
   return {first_piece(work, index, count), first_piece(work, index + 1, count)};
 }
 
-}  // namespace tomofield::distributed
+}  // namespace tomofield::base

@@ -1,4 +1,6 @@
-#include "output/metrics.h"
+#include "output/metrics_record.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -7,6 +9,7 @@
 #include <vector>
 
 #include "base/enum_names.h"
+#include "base/log.h"
 #include "base/threads/parallel.h"
 
 namespace tomofield::output {
@@ -96,6 +99,19 @@ nlohmann::json metrics_json(const fit::Fit& fit, const measurement::Measurement&
           {"threads_why", base::describe_threads()},
           {"mask", mask_json(series)},
           {"views", views}};
+}
+
+nlohmann::json report_held_out(const measurement::ViewErrors& error,
+                               const std::vector<double>& tilt_deg, bool stopped_by_them) {
+  base::log_info(fmt::format(
+      "held out: {} views, error {:.4f}{}", error.views.size(), error.total,
+      stopped_by_them ? " (they also chose when to stop, so others are predicted less well)" : ""));
+  nlohmann::json views = nlohmann::json::array();
+  for (std::size_t i = 0; i < error.views.size(); ++i) {
+    const auto view = static_cast<std::size_t>(error.views[i]);
+    views.push_back({{"view", view}, {"tilt_deg", tilt_deg[view]}, {"error", error.view_error[i]}});
+  }
+  return {{"error", error.total}, {"independent", !stopped_by_them}, {"views", views}};
 }
 
 nlohmann::json compact_json(const compact::CompressionReport& report, double seconds) {
