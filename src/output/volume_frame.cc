@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/plausible.h"
 #include "io/is_file.h"
 #include "io/json.h"
 #include "output/output_paths.h"
@@ -42,11 +43,18 @@ Rotation rotation(double pitch_deg, double alpha_deg, int hand) {
   return product(about_y, about_x);
 }
 
+// Returns an angle of a pose, or 0 if the views are not sure of it.
+double sure_angle(const nlohmann::json& pose, const char* angle, const char* error) {
+  constexpr double kLargest_deg = 90.0, kSure = 3.0;
+  const double angle_deg = io::number_at(pose, angle, -kLargest_deg, kLargest_deg);
+  const double error_deg = io::number_at(pose, error, 0.0, base::kLargestNumber);
+  return std::abs(angle_deg) >= kSure * error_deg ? angle_deg : 0.0;
+}
+
 }  // namespace
 
 Levelling found_levelling(const std::filesystem::path& model) {
   constexpr const char* kAdvice = "give both angles in degrees: --level PITCH,X_TILT";
-  constexpr double kLargest_deg = 90.0;
   const std::filesystem::path path = output_paths(model).alignment;
   if (!io::is_file(path)) {
     throw Error(
@@ -58,9 +66,10 @@ Levelling found_levelling(const std::filesystem::path& model) {
     if (!record.is_object() || !record.contains("pose"))
       throw Error("the views could not tell the pitch");
     const nlohmann::json& pose = record.at("pose");
-    Levelling found{.pitch_deg = io::number_at(pose, "pitch_deg", -kLargest_deg, kLargest_deg)};
-    if (pose.contains("x_tilt_deg"))
-      found.x_tilt_deg = io::number_at(pose, "x_tilt_deg", -kLargest_deg, kLargest_deg);
+    const Levelling found{.pitch_deg = sure_angle(pose, "pitch_deg", "pitch_error_deg"),
+                          .x_tilt_deg = sure_angle(pose, "x_tilt_deg", "x_tilt_error_deg")};
+    if (found.pitch_deg == 0.0 && found.x_tilt_deg == 0.0)
+      throw Error("neither the pitch nor the tilt about X is three of its standard errors");
     return found;
   } catch (const std::exception& error) {
     throw Error(fmt::format("'{}' does not tell how to level the specimen: {}; {}", path.string(),

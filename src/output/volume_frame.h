@@ -15,8 +15,8 @@ struct Levelling {
 };
 
 /// Returns how far the specimen of a model was found to be from level by the alignment of its
-/// run, which lies beside the model (NAME_align.json of NAME.h5). Throws Error if there is none, or
-/// if it could not tell.
+/// run, which lies beside the model (NAME_align.json of NAME.h5). An angle below three of its
+/// standard errors is 0. Throws Error if there is no such file, or if it could not tell an angle.
 Levelling found_levelling(const std::filesystem::path& model);
 
 /// The place of a volume in the field of a model. A point P of the volume lies in the field at

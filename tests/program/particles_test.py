@@ -251,10 +251,18 @@ def test_what_the_alignment_found_levels_the_volume(tilted, scratch):
                                 cwd=scratch)
     assert refused.returncode == 2
     assert "TS_01_align.json" in refused.stderr and "--level PITCH,X_TILT" in refused.stderr
-    with open(os.path.join(scratch, "TS_01_align.json"), "w", encoding="utf-8") as file:
-        json.dump({"pose": {"pitch_deg": PITCH, "x_tilt_deg": -X_TILT}}, file)
-    np.testing.assert_array_equal(levelled(scratch, "--level", "found"),
-                                  levelled(scratch, "--level", f"{PITCH},{-X_TILT}"))
+    for errors, level in (((1, 1), f"{PITCH},{-X_TILT}"), ((1, 2), f"{PITCH},0"), ((3, 2), None)):
+        pose = {"pitch_deg": PITCH, "pitch_error_deg": errors[0], "x_tilt_deg": -X_TILT,
+                "x_tilt_error_deg": errors[1]}
+        with open(os.path.join(scratch, "TS_01_align.json"), "w", encoding="utf-8") as file:
+            json.dump({"pose": pose}, file)
+        if level is None:  # the views are sure of neither angle
+            refused = harness.tomofield("export", "TS_01.h5", "-o", "unsure.mrc", "--level", "found",
+                                        cwd=scratch)
+            assert refused.returncode == 2 and "standard errors" in refused.stderr, refused.stderr
+        else:
+            np.testing.assert_array_equal(levelled(scratch, "--level", "found"),
+                                          levelled(scratch, "--level", level))
 
 
 def test_boxes_and_particles_lie_in_the_levelled_volume(tilted):
