@@ -10,6 +10,7 @@ import gate_cases
 import gate_checks
 import gate_files
 import readme_page
+import start_page
 
 
 def faults():
@@ -19,6 +20,8 @@ def faults():
         return ["README: bench/readme has made no record yet"]
     found = readme_page.faults(readme_page.read(), record["stated"], record["pictures"])
     found += exosome_page.faults(record) + changed_pictures(record)
+    found += [f"bench/readme has not made {path} of docs/start.md"
+              for path in start_page.pictures() if path not in record["pictures"]]
     return [f"README: {fault}" for fault in found] + age_faults(record)
 
 

@@ -4,6 +4,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
+#include <tomofield/baseline.h>
 #include <tomofield/error.h>
 #include <tomofield/evaluate.h>
 #include <tomofield/messages.h>
@@ -11,10 +12,10 @@
 #include <tomofield/project.h>
 #include <tomofield/reconstruct.h>
 #include <tomofield/version.h>
+#include <tomofield/volume_file.h>
 
 #include <array>
 #include <cstdint>
-#include <exception>
 #include <memory>
 #include <optional>
 #include <string>
@@ -86,33 +87,26 @@ TiltSeries series_of(const py::object& views, const py::object& tilts_deg) {
                                   .tilt_deg = {tilts.data(), tilts.data() + tilts.size()}});
 }
 
-// Calls Python after every step: the user's callback, if any, and the handlers of signals. Keeps
-// the exception that they raise until the reconstruction has ended in order.
+// Calls Python after every step: the user's callback, if any, and the handlers of signals. What
+// they raise leaves the library's function once it has ended in order. It must outlive what it
+// returns, since copies would count references without the interpreter's lock.
 class Listener {
  public:
   explicit Listener(py::object callback) : callback_(std::move(callback)) {}
 
-  bool operator()(const Progress& progress) {
-    if (must_stop()) return false;
-    const py::gil_scoped_acquire locked;
-    try {
+  ProgressCallback callback() const {
+    return [this](const Progress& progress) {
+      if (must_stop()) return false;
+      const py::gil_scoped_acquire locked;
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
       if (callback_.is_none()) return true;
       const py::object answer = callback_(progress);
       return answer.is_none() || answer.cast<bool>();
-    } catch (...) {
-      raised_ = std::current_exception();
-      return false;
-    }
-  }
-
-  void rethrow() const {
-    if (raised_) std::rethrow_exception(raised_);
+    };
   }
 
  private:
   py::object callback_;
-  std::exception_ptr raised_;
 };
 
 // Passes messages to the logger "tomofield". Whatever says something runs without the interpreter's
@@ -129,44 +123,81 @@ void log(MessageKind kind, std::string_view text) {
   }
 }
 
-// Reads a project, or takes the path of a stack. Its warnings go to the logger.
-option_table::Choices open(const std::filesystem::path& path, const std::string& series,
-                           const std::string& ignore) {
-  const Project project = open_project({path, series, ignore});
+// Reads a project, or takes the path of a stack. Returns its choices and its warnings, which go to
+// the logger as well.
+std::pair<option_table::Choices, std::vector<std::string>> open(const std::filesystem::path& path,
+                                                                const std::string& series,
+                                                                const std::string& ignore) {
+  Project project = open_project({path, series, ignore});
   for (const std::string& warning : project.warnings) log(MessageKind::kWarning, warning);
-  return {project.files, project.options};
+  return {{std::move(project.files), std::move(project.options)}, std::move(project.warnings)};
 }
 
 bool align_series(const TiltSeries& series, const option_table::Choices& choices,
                   py::object callback) {
-  Listener listener(std::move(callback));
-  bool is_finished = false;
-  {
-    const Unlocked unlocked;
-    is_finished = align(series, choices.options,
-                        [&](const Progress& progress) { return listener(progress); });
-  }
-  listener.rethrow();
-  return is_finished;
+  const Listener listener(std::move(callback));
+  const Unlocked unlocked;
+  return align(series, choices.options, listener.callback());
+}
+
+// Returns a volume in memory as numbers and the size of a voxel.
+py::tuple to_tuple(Tomogram tomogram) {
+  return py::make_tuple(to_volume(std::move(tomogram.values), tomogram.size),
+                        tomogram.voxel_size_A);
 }
 
 py::dict run(const TiltSeries& series, const option_table::Choices& choices, py::object callback) {
-  Listener listener(std::move(callback));
+  const Listener listener(std::move(callback));
   Reconstruction made;
   {
     const Unlocked unlocked;
-    made = reconstruct(series, choices.options,
-                       [&](const Progress& progress) { return listener(progress); });
+    made = reconstruct(series, choices.options, listener.callback());
   }
-  listener.rethrow();
   py::dict result;
   result["is_finished"] = made.is_finished;
   result["metrics"] = made.metrics;
   result["model"] = made.model;
+  result["choices"] = option_table::Choices{choices.files, made.options};
   result["tomogram"] = py::none();
-  if (made.tomogram)
-    result["tomogram"] = to_volume(std::move(made.tomogram->values), made.tomogram->size);
+  if (made.tomogram) result["tomogram"] = to_tuple(std::move(*made.tomogram));
   return result;
+}
+
+py::dict run_baseline(const TiltSeries& series, BaselineMethod method,
+                      const option_table::Choices& choices, py::object callback) {
+  const Listener listener(std::move(callback));
+  Baseline made;
+  {
+    const Unlocked unlocked;
+    made = reconstruct_baseline(series, method, choices.options, listener.callback());
+  }
+  py::dict result;
+  result["is_finished"] = made.is_finished;
+  result["metrics"] = made.metrics;
+  result["tomogram"] = to_tuple(std::move(made.tomogram));
+  return result;
+}
+
+void export_box(const Model& model, const SampleBox& box, const std::filesystem::path& path,
+                const option_table::Choices& choices) {
+  const Unlocked unlocked;
+  export_volume(model, box, {path, choices.options.volume, choices.options.run.overwrite});
+}
+
+py::tuple read_volume(const std::filesystem::path& path) {
+  Tomogram volume;
+  {
+    const Unlocked unlocked;
+    volume = read_mrc(path);
+  }
+  return to_tuple(std::move(volume));
+}
+
+void write_volume(const py::object& volume, double voxel_size_A, const std::filesystem::path& path,
+                  bool overwrite) {
+  const Tomogram tomogram = to_tomogram(volume, voxel_size_A);
+  const Unlocked unlocked;
+  write_mrc(tomogram, path, overwrite);
 }
 
 py::array_t<float> sample(const Model& model, const SampleBox& box) {
@@ -208,9 +239,15 @@ void add_reconstruct(py::module_& module) {
       .def_readonly("is_trial", &Progress::is_trial,
                     "True for trials that choose settings before the fit")
       .def_readonly("detail", &Progress::detail, "a few words: epoch, loss, steps a second");
+  py::enum_<BaselineMethod>(module, "BaselineMethod")
+      .value("wbp", BaselineMethod::kWbp)
+      .value("sirt", BaselineMethod::kSirt)
+      .value("sart-tv", BaselineMethod::kSartTv)
+      .value("tv", BaselineMethod::kTv);
   module.def("open_project", &open);
   module.def("align", &align_series);
   module.def("reconstruct", &run);
+  module.def("baseline", &run_baseline);
   module.def("set_thread_count", &set_thread_count);
 }
 
@@ -230,6 +267,9 @@ void add_model(py::module_& module) {
       .def("region", &Model::region)
       .def("sample", &sample)
       .def("sample_points", &sample_points);
+  module.def("export_box", &export_box);
+  module.def("read_mrc", &read_volume);
+  module.def("write_mrc", &write_volume);
 }
 
 void add_evaluate(py::module_& module) {

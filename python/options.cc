@@ -67,7 +67,10 @@ void add_property(py::class_<Choices>& choices, const Row& row, Reference<T> mem
   using Value = typename InPython<T>::type;
   choices.def_property(
       row.name.data(), [member](Choices& c) { return to_python(member(c)); },
-      [member, &row](Choices& c, const Value& value) { member(c) = from_python<T>(row, value); });
+      [member, &row](Choices& c, const Value& value) {
+        member(c) = from_python<T>(row, value);
+        c.options.given.emplace_back(row.flag);
+      });
 }
 
 template <typename T, typename Optional>
@@ -82,6 +85,10 @@ void add_optional(py::class_<Choices>& choices, const Row& row, Reference<Option
       [member, &row](Choices& c, const Value& value) {
         Choices usual;
         member(c) = value ? Optional(from_python<T>(row, *value)) : member(usual);
+        if (value)
+          c.options.given.emplace_back(row.flag);
+        else
+          std::erase(c.options.given, row.flag);
       });
 }
 
@@ -104,7 +111,7 @@ void add_options(py::module_& module) {
   choices.def_property_readonly("settings", [](const Choices& c) {
     py::list settings;
     for (const Setting& s : c.options.settings)
-      settings.append(py::make_tuple(s.option, s.value, s.file, s.entry));
+      settings.append(py::make_tuple(s.option, s.value, s.file, s.entry, s.row));
     return settings;
   });
   py::list files;

@@ -192,13 +192,15 @@ struct RunOptions {
   bool alignment_json = false;  ///< write the alignment for the CryoET Data Portal as well
 };
 
-/// An option that a file of another program set, and where it says so.
+/// An option that a file sets, and where it says so: a file of another program, or the choice of a
+/// batch.
 struct Setting {
   std::string option;          ///< as users type it: "--thickness", or "stack"
   std::string value;           ///< as users type it; "true" for a flag
   std::filesystem::path file;  ///< "TS_01/tilt.com"
   std::string entry;           ///< the name in that file: "THICKNESS"
   std::string row = {};        ///< the name of its row, if the file lists several series
+  std::string instead = {};  ///< what holds in its place: "--thickness 200"; empty: it holds itself
 };
 
 /// Everything that a user can choose for a reconstruction; docs/options.md lists flags, units,
@@ -211,7 +213,8 @@ struct Options {
   FitOptions fit;
   VolumeOptions volume;
   RunOptions run;
-  std::vector<Setting> settings = {};  ///< what the files of a project set (open_project())
+  std::vector<Setting> settings = {};   ///< what the files of a project set (open_project())
+  std::vector<std::string> given = {};  ///< flags that the user gave, also with the default value
 };
 
 }  // namespace tomofield

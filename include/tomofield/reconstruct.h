@@ -18,7 +18,7 @@ struct ViewImages {
   std::vector<float> values;
   std::int64_t width = 0, height = 0;  ///< pixels of a view
   std::vector<double> tilt_deg;        ///< one a view, rotation about +Y
-  double pixel_size_A = 1.0;
+  double pixel_size_A = 0.0;           ///< 0: ViewOptions::pixel_size_A gives it
 };
 
 /// The input of a reconstruction: files, or arrays in memory. It is cheap to copy.
@@ -46,7 +46,8 @@ struct Progress {
 };
 
 /// Receives progress after every step, in the thread that called reconstruct(). Returns false to
-/// stop the reconstruction. May throw: the exception leaves reconstruct(), and nothing is saved.
+/// stop the reconstruction. May throw: the reconstruction then stops as if it had returned false,
+/// and the exception leaves reconstruct().
 using ProgressCallback = std::function<bool(const Progress&)>;
 
 /// The results of reconstruct().
@@ -57,6 +58,7 @@ struct Reconstruction {
   std::optional<Tomogram> tomogram;
   std::optional<Model> model;  ///< halves have none: their models are files beside the tomogram
   std::string metrics;         ///< JSON: what `tomofield reconstruct` writes beside the volume
+  Options options;             ///< as they were used, with what trials have chosen
 };
 
 /// Fits a density field to a tilt series and samples it as a tomogram: the whole job of

@@ -1,7 +1,7 @@
 #include <memory>
-#include <mutex>
 #include <utility>
 
+#include "api/public_call.h"
 #include "base/log.h"
 #include "base/threads/parallel.h"
 #include "io/images/image_stack.h"
@@ -9,21 +9,12 @@
 #include "options/run_options.h"
 #include "output/public_model.h"
 #include "reconstruct/reconstruct.h"
+#include "record/run_record.h"
 #include "tomofield/error.h"
 #include "tomofield/messages.h"
 #include "tomofield/reconstruct.h"
 
-// The public functions and classes of include/tomofield/, apart from Model and evaluate().
 namespace tomofield {
-
-struct TiltSeries::Impl {
-  SeriesFiles files;
-  std::shared_ptr<const io::ImageStack> images;  // none: the files
-};
-
-struct TiltSeriesAccess {
-  static const TiltSeries::Impl& impl(const TiltSeries& series) { return *series.impl_; }
-};
 
 namespace {
 
@@ -34,56 +25,16 @@ options::ReconstructOptions internal_options(const TiltSeries& series, const Opt
   return internal;
 }
 
-// Calls the callback after every step and remembers whether it wants to stop.
-class Listener {
- public:
-  explicit Listener(const ProgressCallback& callback) : callback_(callback) {}
-
-  reconstruction::Observer observer() {
-    if (!callback_) return {};
-    const auto tell_trial = [this](const base::ProgressReport& report) { tell(report, true); };
-    return {.planned = {},
-            .alignment = tell_trial,
-            .trials = tell_trial,
-            .fit = [this](const base::ProgressReport& report) { tell(report, false); },
-            .stop_requested = [this] { return wants_stop_; }};
-  }
-
- private:
-  void tell(const base::ProgressReport& report, bool is_trial) {
-    const bool goes_on = callback_({.fraction_done = report.fraction_done,
-                                    .seconds_elapsed = report.seconds_elapsed,
-                                    .seconds_left = report.seconds_left,
-                                    .is_trial = is_trial,
-                                    .detail = report.detail});
-    wants_stop_ = wants_stop_ || !goes_on;
-  }
-
-  const ProgressCallback& callback_;
-  bool wants_stop_ = false;
-};
-
-// Waits until no other thread reconstructs. Throws Error in a callback, which would wait for
-// itself.
-class OneAtATime {
- public:
-  OneAtATime() {
-    if (is_reconstructing_)
-      throw Error("a callback cannot start another reconstruction: start it when this one is done");
-    mutex_.lock();
-    is_reconstructing_ = true;
-  }
-  ~OneAtATime() {
-    is_reconstructing_ = false;
-    mutex_.unlock();
-  }
-  OneAtATime(const OneAtATime&) = delete;
-  OneAtATime& operator=(const OneAtATime&) = delete;
-
- private:
-  static inline std::mutex mutex_;
-  static inline thread_local bool is_reconstructing_ = false;
-};
+// Returns what tells a listener of a reconstruction.
+reconstruction::Observer observer_of(api::Listener& listener) {
+  if (!listener.has_callback()) return {};
+  const auto tell_trial = [&](const base::ProgressReport& report) { listener.tell(report, true); };
+  return {.planned = {},
+          .alignment = tell_trial,
+          .trials = tell_trial,
+          .fit = [&](const base::ProgressReport& report) { listener.tell(report, false); },
+          .stop_requested = [&] { return listener.wants_stop(); }};
+}
 
 }  // namespace
 
@@ -102,13 +53,17 @@ TiltSeries TiltSeries::from_images(ViewImages images) {
 
 Reconstruction reconstruct(const TiltSeries& series, const Options& options,
                            const ProgressCallback& progress) {
-  const OneAtATime turn;
-  Listener listener(progress);
+  const api::OneAtATime turn;
+  api::Listener listener(progress);
   reconstruction::RunResult run =
-      reconstruction::run(internal_options(series, options), listener.observer());
+      reconstruction::run(internal_options(series, options), observer_of(listener));
+  listener.rethrow();
   if (run.outcome != reconstruction::Outcome::kFinished) return {};
-  Reconstruction made{
-      .is_finished = true, .tomogram = {}, .model = {}, .metrics = io::json_text(run.metrics)};
+  Reconstruction made{.is_finished = true,
+                      .tomogram = {},
+                      .model = {},
+                      .metrics = io::json_text(record::to_json(run.record)),
+                      .options = std::move(run.options)};
   if (options.run.output.empty())
     made.tomogram = output::sample_tomogram(*run.model, options.volume.invert);
   if (run.model) made.model = ModelAccess::make(std::move(*run.model));
@@ -116,10 +71,12 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
 }
 
 bool align(const TiltSeries& series, const Options& options, const ProgressCallback& progress) {
-  const OneAtATime turn;
-  Listener listener(progress);
+  const api::OneAtATime turn;
+  api::Listener listener(progress);
   options::ReconstructOptions internal = internal_options(series, options);
-  return reconstruction::align(internal, listener.observer());
+  const bool is_finished = reconstruction::align(internal, observer_of(listener));
+  listener.rethrow();
+  return is_finished;
 }
 
 Options resolve_options(const Options& options, const SeriesFiles& files) {

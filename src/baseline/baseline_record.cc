@@ -88,17 +88,17 @@ json metrics_json(const BaselineRecord& record) {
           {"seconds", seconds},
           {"threads", base::thread_count()},
           {"threads_why", base::describe_threads()},
-          {"mask", output::mask_json(series)},
+          {"mask", output::mask_json(output::masked_views(series))},
           {"views", views},
           {"held_out",
-           held_out ? output::report_held_out(*held_out, series.geometry.tilt_deg) : json(nullptr)},
+           held_out ? output::held_out_json(*held_out, series.geometry.tilt_deg) : json(nullptr)},
           {"tuning", tuned ? tune::tuned_json(*tuned, json_of) : json(nullptr)}};
 }
 
 }  // namespace
 
-void write_record(const std::filesystem::path& file, const BaselineRecord& record) {
-  io::write_json(file, {{"tomofield", TOMOFIELD_VERSION},
+std::string record_text(const BaselineRecord& record) {
+  return io::json_text({{"tomofield", TOMOFIELD_VERSION},
                         {"options", options_json(record.options)},
                         {"origins", option_table::settings_json(record.options.shared.settings)},
                         {"metrics", metrics_json(record)}});

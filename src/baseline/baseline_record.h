@@ -1,6 +1,5 @@
 #pragma once
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -24,8 +23,8 @@ struct BaselineRecord {
   const std::optional<measurement::ViewErrors>& held_out;  ///< none if no views are held out
 };
 
-/// Writes the record of a run, the JSON file beside the volume.
-void write_record(const std::filesystem::path& file, const BaselineRecord& record);
+/// Returns the record of a run as the JSON file beside the volume has it.
+std::string record_text(const BaselineRecord& record);
 
 /// Returns the name and every option of a method.
 nlohmann::json json_of(const Method& method);

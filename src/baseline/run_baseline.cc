@@ -15,6 +15,7 @@
 #include "baseline/baseline_record.h"
 #include "baseline/tune.h"
 #include "baseline/voxel_problem.h"
+#include "io/saving/atomic_file.h"
 #include "io/saving/output_files.h"
 #include "io/saving/scratch_memory.h"
 #include "kernels/lanes.h"
@@ -24,8 +25,10 @@
 #include "measurement/undecided_beads.h"
 #include "measurement/view_transfers.h"
 #include "option_table/values.h"
+#include "output/metrics_record.h"
 #include "output/model_file.h"
 #include "output/output_paths.h"
+#include "output/public_model.h"
 #include "output/volume.h"
 #include "projection/sample_grid.h"
 #include "tilt_series/series_plan.h"
@@ -107,6 +110,18 @@ AfterIteration report_to(const base::ProgressSink& progress, const MethodFacts& 
   };
 }
 
+// Returns the volume in the input's units and contrast.
+Tomogram tomogram_of(const Solution& solution, const measurement::Measurement& series,
+                     const BaselineOptions& options) {
+  const output::ModelInfo info = output::model_info(series, options.shared.views.contrast);
+  const field::OrientedBox box = output::region_box(info, 1.0);
+  Tomogram tomogram{.size = box.size,
+                    .voxel_size_A = info.pixel_size_A,
+                    .values = field::gather_box(box, voxels_of(solution.densities))};
+  output::to_output(info, tomogram.values, options.shared.volume.invert);
+  return tomogram;
+}
+
 void write_volume(const Solution& solution, const measurement::Measurement& series,
                   const BaselineOptions& options, const std::filesystem::path& path) {
   output::ModelInfo info = output::model_info(series, options.shared.views.contrast);
@@ -116,10 +131,6 @@ void write_volume(const Solution& solution, const measurement::Measurement& seri
                path);
 }
 
-BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays,
-                           const measurement::Measurement& series) {
-  return {2 * solution.data_loss.back() / static_cast<double>(num_rays), last_decrease(solution),
-          series.masks.bead_masking};
 }
 
 // Prepares the views, and corrects their contrast transfer if the options have one.
@@ -128,8 +139,7 @@ measurement::Measurement prepare(const tilt_series::TiltSeries& tilt_series,
                                  const std::filesystem::path& scratch_dir) {
   measurement::Measurement series = measurement::prepare_measurement(
       tilt_series, options.shared.specimen, scratch_dir,
-      measurement::view_transfers(tilt_series::series_options(options.files, options.shared),
-                                  options.shared.specimen.hand, tilt_series));
+      measurement::view_transfers(options.input(), options.shared.specimen.hand, tilt_series));
   if (series.transfers.empty()) return series;
   const base::TraceSpan span("correct contrast transfer");
   measurement::correct_ctf(options.ctf_correction, series);
@@ -140,11 +150,18 @@ measurement::Measurement prepare(const tilt_series::TiltSeries& tilt_series,
 
 }  // namespace
 
+tilt_series::TiltSeriesOptions BaselineOptions::input() const {
+  tilt_series::TiltSeriesOptions input = tilt_series::series_options(files, shared);
+  input.images = images;
+  return input;
+}
+
 void check_options(const BaselineOptions& options) {
   constexpr const char* kAdvice = "give --overwrite to replace it, or another name with -o";
   base::require_no_faults(option_table::range_faults(options.shared));
   const auto faults = measurement::faults_of_transfer(options.files, options.shared.views);
   base::require_no_faults({faults.begin(), faults.end()});
+  if (options.shared.run.output.empty()) return;
   io::require_volume_name(options.shared.run.output);
   const output::OutputPaths paths = output::output_paths(options.shared.run.output);
   std::vector<std::filesystem::path> results = paths.pictures();
@@ -232,10 +249,20 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   std::optional<measurement::ViewErrors> errors;
   if (!held_out.empty())
     errors = held_out_errors(problem, held_out, fit_view_scale, solution.densities);
-  write_volume(solution, series, options, paths.volume);
-  write_record(paths.json, {options, series, problem, solution, size.num_parameters, fit_seconds,
-                            tuned, errors});
-  return summary_of(solution, problem.num_rays(), series);
+  if (errors) output::log_held_out(*errors);
+  BaselineSummary summary{.mean_squared_residual = 2 * solution.data_loss.back() /
+                                                   static_cast<double>(problem.num_rays()),
+                          .last_decrease = last_decrease(solution),
+                          .bead_masking = series.masks.bead_masking,
+                          .record = record_text({options, series, problem, solution,
+                                                 size.num_parameters, fit_seconds, tuned, errors})};
+  if (options.shared.run.output.empty()) {
+    summary.tomogram = tomogram_of(solution, series, options);
+  } else {
+    write_volume(solution, series, options, paths.volume);
+    io::write_text_file(paths.json, summary.record);
+  }
+  return summary;
 }
 
 void write_linear_volume(const measurement::Measurement& series, const Options& shared,

@@ -1,16 +1,20 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "base/progress.h"
 #include "baseline/method.h"
+#include "io/images/image_stack.h"
 #include "io/saving/output_lock.h"
 #include "measurement/prepare.h"
 #include "microscope/view_filter.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
+#include "tomofield/tomogram.h"
 
 namespace tomofield::baseline {
 
@@ -27,10 +31,15 @@ struct BaselineOptions {
 
   /// Returns whether the scales of views are fitted, which the contrast decides unless it is given.
   bool fits_view_scale() const;
+  std::shared_ptr<const io::ImageStack> images = {};  ///< views in memory, in place of files.stack
+
+  /// Returns how the tilt series is read.
+  tilt_series::TiltSeriesOptions input() const;
 };
 
 /// Checks the options and the output files. Throws Error for options out of range, and if results
-/// would replace existing ones without `overwrite` or cannot be written.
+/// would replace existing ones without `overwrite` or cannot be written. Without an output there
+/// are no files.
 void check_options(const BaselineOptions& options);
 
 /// Checks the options and locks the files of a run against other runs. The run holds the locks to
@@ -53,11 +62,13 @@ struct BaselinePlan {
 BaselinePlan plan_baseline(const tilt_series::PlannedSeries& series,
                            const BaselineOptions& options);
 
-/// The results of a run that the program prints.
+/// The results of a run that the program prints, or that stay in memory.
 struct BaselineSummary {
   double mean_squared_residual = 0;     ///< in units of the noise's variance
   std::optional<double> last_decrease;  ///< last_decrease(), for iterative methods
   tilt_series::BeadMasking bead_masking = tilt_series::BeadMasking::kNone;
+  std::string record = {};                ///< the content of the JSON file: options and metrics
+  std::optional<Tomogram> tomogram = {};  ///< of a run without an output
 };
 
 /// The receivers of the progress of a run.
@@ -66,8 +77,9 @@ struct BaselineProgress {
 };
 
 /// Reads the series, tunes if the options ask for it, reconstructs, and writes the volume (MRC, in
-/// the input's units and contrast) and the metrics and resolved options (JSON). Starts at once:
-/// call check_options() and plan_baseline() first.
+/// the input's units and contrast) and the metrics and resolved options (JSON). Without an output
+/// it returns the volume and writes nothing. Starts at once: call check_options() and
+/// plan_baseline() first. An exception of `progress` ends it.
 BaselineSummary run_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options,
                              const BaselineProgress& progress);
 

@@ -14,11 +14,14 @@ namespace tomofield::batch {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
+bool is_shared(std::string_view flag) {
+  return flag == "--tv" || flag == "--tv-penalty" || flag == "--spike-rank" || flag == "--prior";
+}
+
 std::vector<std::string> shared_words(const std::vector<std::string>& command) {
   std::vector<std::string> words;
   std::ranges::copy_if(command, std::back_inserter(words), [](const std::string& word) {
-    return word.starts_with("--tv=") || word.starts_with("--tv-penalty=") ||
-           word.starts_with("--spike-rank=") || word.starts_with("--prior=");
+    return is_shared(std::string_view(word).substr(0, word.find('=')));
   });
   return words;
 }

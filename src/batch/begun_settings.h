@@ -3,9 +3,13 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace tomofield::batch {
+
+/// Returns true for the flags of the settings which the series of a batch share, as "--tv".
+bool is_shared(std::string_view flag);
 
 /// Returns the words of a command that give settings which the series of a batch share, as in
 /// "--tv=5" (choice.h).

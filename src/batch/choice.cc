@@ -115,6 +115,13 @@ Choice choice_from(const json& document) {
   return choice;
 }
 
+// Adds the words that give shared settings to a job.
+void give_words(const std::vector<std::string>& words, const fs::path& folder, Job& job) {
+  if (words.empty()) return;
+  job.command.insert(job.command.end(), words.begin(), words.end());
+  job.command.push_back("--batch-choice=" + choice_file(folder).string());
+}
+
 // Returns the words that give shared settings to a job.
 std::vector<std::string> settings_words(const SharedSettings& settings, const Needs& needs) {
   std::vector<std::string> words{fmt::format("--tv-penalty={}", base::name_of(settings.penalty)),
@@ -142,7 +149,7 @@ std::vector<std::size_t> keep_begun_settings(const fs::path& folder,
     if (entry != begun.end()) {
       if (stored && entry->second != settings_words(stored->settings, job.needs))
         differing.push_back(i);
-      job.command.insert(job.command.end(), entry->second.begin(), entry->second.end());
+      give_words(entry->second, folder, job);
     }
     job.needs.open_variation = job.needs.open_spike_rank = job.needs.open_prior = false;
   }
@@ -187,12 +194,9 @@ std::optional<Choice> count_votes(std::vector<Vote> votes) {
                 .votes = std::move(votes)};
 }
 
-void give_choice(const Choice& choice, std::vector<Job>& jobs) {
-  for (Job& job : jobs) {
-    if (!takes_choice(job)) continue;
-    const std::vector<std::string> words = settings_words(choice.settings, job.needs);
-    job.command.insert(job.command.end(), words.begin(), words.end());
-  }
+void give_choice(const Choice& choice, const fs::path& folder, std::vector<Job>& jobs) {
+  for (Job& job : jobs)
+    if (takes_choice(job)) give_words(settings_words(choice.settings, job.needs), folder, job);
 }
 
 std::string describe(const Choice& choice) {

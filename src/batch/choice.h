@@ -60,8 +60,9 @@ ChoicePlan plan_choice(const std::filesystem::path& folder, bool continues, std:
 /// variation if there is no majority). Returns nothing if nobody has a vote.
 std::optional<Choice> count_votes(std::vector<Vote> votes);
 
-/// Adds the choice to the commands of the jobs that lack it.
-void give_choice(const Choice& choice, std::vector<Job>& jobs);
+/// Adds the choice to the commands of the jobs that lack it, and the name of its file in the folder
+/// of the batch, by which their reports say who chose.
+void give_choice(const Choice& choice, const std::filesystem::path& folder, std::vector<Job>& jobs);
 
 /// Describes a choice and the votes, as in "smooth tv 5, by the trials of a (smooth tv 4.8) and …".
 std::string describe(const Choice& choice);

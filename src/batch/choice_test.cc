@@ -79,9 +79,10 @@ TEST(GiveChoice, GivesThePriorToSeriesThatLeaveItOpen) {
   const Choice choice = *count_votes({vote(Penalty::kSmooth, 4.5, 3, Prior::kLearned)});
   std::vector<Job> jobs = open_jobs(2, "/");
   jobs[0].needs.open_prior = true;
-  give_choice(choice, jobs);
-  EXPECT_EQ(jobs[0].command.back(), "--prior=learned");
-  EXPECT_EQ(jobs[1].command.back(), "--spike-rank=3");
+  give_choice(choice, "/out", jobs);
+  EXPECT_EQ(jobs[0].command[3], "--prior=learned");
+  EXPECT_EQ(jobs[0].command.back(), "--batch-choice=/out/choice.json");
+  EXPECT_EQ(jobs[1].command[2], "--spike-rank=3");
 }
 
 TEST(PlanChoice, LetsTheFirstTheMiddleAndTheLastOfTheListChoose) {
@@ -126,27 +127,29 @@ TEST(PlanChoice, LetsSeriesThatHaveBegunGoOnWithTheirSettings) {
   const ScratchDirectory directory;
   using Words = std::vector<std::string>;
   std::vector<Job> jobs = open_jobs(4, directory.path());
-  give_choice(*count_votes({vote(Penalty::kSmooth, 4.5)}), jobs);
+  give_choice(*count_votes({vote(Penalty::kSmooth, 4.5)}), directory.path(), jobs);
   jobs.pop_back();  // the last series is new in the list of the next batch
   write_jobs(list_of(directory.path()), {.jobs = jobs, .overwrites = false});
   for (const char* model : {"a.h5", "d.h5"}) directory.write(model, "");
   const auto planned = [&] {
     std::vector<Job> next = open_jobs(4, directory.path());
     const ChoicePlan plan = plan_choice(directory.path(), true, next);
-    if (plan.stored) give_choice(*plan.stored, next);
+    if (plan.stored) give_choice(*plan.stored, directory.path(), next);
     return std::pair(plan, next);
   };
   write_choice(directory.path(), *count_votes({vote(Penalty::kConcave, 14)}));  // edited
   auto [plan, next] = planned();
-  EXPECT_EQ(next[0].command, (Words{"--tv-penalty=smooth", "--tv=4.5", "--spike-rank=3"}));
-  EXPECT_EQ(next[1].command, (Words{"--tv-penalty=concave", "--tv=14", "--spike-rank=3"}));
+  const std::string file = "--batch-choice=" + choice_file(directory.path()).string();
+  const Words smooth{"--tv-penalty=smooth", "--tv=4.5", "--spike-rank=3", file};
+  EXPECT_EQ(next[0].command, smooth);
+  EXPECT_EQ(next[1].command, (Words{"--tv-penalty=concave", "--tv=14", "--spike-rank=3", file}));
   EXPECT_EQ(next[3].command, next[1].command);  // nothing says what it began with
   EXPECT_EQ(plan.differing, std::vector<std::size_t>{0});
   write_choice(directory.path(), *count_votes({vote(Penalty::kSmooth, 4.5)}));
   EXPECT_TRUE(planned().first.differing.empty());
   forget_choice(directory.path());
   next = planned().second;
-  EXPECT_EQ(next[0].command, (Words{"--tv-penalty=smooth", "--tv=4.5", "--spike-rank=3"}));
+  EXPECT_EQ(next[0].command, smooth);
   EXPECT_TRUE(next[1].command.empty());
   directory.write("batch.json", R"({"jobs": [{}]})");
   const std::string said = testing::message_of<Error>(planned);
@@ -159,10 +162,11 @@ TEST(GiveChoice, AddsWhatASeriesLacks) {
   std::vector<Job> jobs = open_jobs(3, "out");
   jobs[1].needs.open_spike_rank = false;
   jobs[2].needs.open_variation = jobs[2].needs.open_spike_rank = false;
-  give_choice(*count_votes({vote(Penalty::kSmooth, 4.5)}), jobs);
+  give_choice(*count_votes({vote(Penalty::kSmooth, 4.5)}), "out", jobs);
   using Words = std::vector<std::string>;
-  EXPECT_EQ(jobs[0].command, (Words{"--tv-penalty=smooth", "--tv=4.5", "--spike-rank=3"}));
-  EXPECT_EQ(jobs[1].command, (Words{"--tv-penalty=smooth", "--tv=4.5"}));
+  const std::string file = "--batch-choice=out/choice.json";
+  EXPECT_EQ(jobs[0].command, (Words{"--tv-penalty=smooth", "--tv=4.5", "--spike-rank=3", file}));
+  EXPECT_EQ(jobs[1].command, (Words{"--tv-penalty=smooth", "--tv=4.5", file}));
   EXPECT_TRUE(jobs[2].command.empty());
 }
 

@@ -55,7 +55,7 @@ bool make_choice(const RunOptions& options, const std::vector<std::size_t>& choo
   }
   base::log_info(fmt::format("for all series: {}", describe(*choice)));
   write_choice(options.folder, *choice);
-  give_choice(*choice, list.jobs);
+  give_choice(*choice, options.folder, list.jobs);
   write_jobs(list_of(options.folder), list);
   write_summary(options.folder, list.jobs);
   return true;

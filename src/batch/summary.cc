@@ -6,7 +6,6 @@
 #include <array>
 #include <chrono>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <thread>
@@ -18,18 +17,17 @@
 #include "batch/csv.h"
 #include "batch/relion_table.h"
 #include "batch/state.h"
-#include "io/json.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_lock.h"
 #include "io/saving/output_set.h"
 #include "output/output_paths.h"
+#include "record/run_summary_record.h"
 #include "report/html.h"
 #include "tomofield/error.h"
 
 namespace tomofield::batch {
 namespace {
 
-using nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr double kGibibyte = 1 << 30;
@@ -38,23 +36,15 @@ constexpr double kGibibyte = 1 << 30;
 struct Line {
   const Job* job;
   State state;
-  std::optional<double> held_out_error;
-  std::string verdict;  // its line
-  std::vector<std::string> warnings;
+  record::RunSummary run;
 };
 
-// Reads what the metrics of a finished run say. Metrics of another version may say less.
-void read_metrics(const fs::path& file, Line& line) {
+// Reads what a finished run says of itself. A file that cannot be read says nothing.
+record::RunSummary read_run(const fs::path& file) {
   try {
-    const json metrics = io::read_json(file).at("metrics");
-    const json& verdict = metrics.at("verdict");
-    line.verdict = verdict.value("line", "");
-    for (const json& warning : verdict.at("warnings"))
-      line.warnings.push_back(warning.at("message").get<std::string>());
-    if (const json& held_out = metrics.at("held_out"); held_out.is_object())
-      line.held_out_error = held_out.at("error").get<double>();
-  } catch (const json::exception&) {
+    return record::read_summary(file);
   } catch (const Error&) {
+    return {};
   }
 }
 
@@ -73,8 +63,9 @@ std::vector<Job> finished_jobs(const std::vector<Line>& lines) {
 std::vector<Line> read_lines(const fs::path& folder, const std::vector<Job>& jobs) {
   std::vector<Line> lines;
   for (const Job& job : jobs) {
-    lines.push_back({&job, read_state(folder, job), {}, {}, {}});
-    if (has_result(lines.back())) read_metrics(output::output_paths(job.output).json, lines.back());
+    lines.push_back({&job, read_state(folder, job), {}});
+    if (has_result(lines.back()))
+      lines.back().run = read_run(output::output_paths(job.output).json);
   }
   return lines;
 }
@@ -102,9 +93,9 @@ std::string csv_text(const std::vector<Line>& lines) {
         optional_number(needs.core_seconds, 1),
         number(static_cast<double>(costs.peak_bytes) / kGibibyte, 3),
         number(static_cast<double>(needs.memory_bytes_of_one_thread) / kGibibyte, 3),
-        optional_number(line.held_out_error, 5),
-        spreadsheet_text(line.verdict),
-        spreadsheet_text(fmt::format("{}", fmt::join(line.warnings, " "))),
+        optional_number(line.run.held_out_error, 5),
+        spreadsheet_text(line.run.verdict),
+        spreadsheet_text(fmt::format("{}", fmt::join(line.run.warnings, " "))),
     };
     std::vector<std::string> quoted;
     for (const std::string& field : fields) quoted.push_back(csv_field(field));
@@ -130,15 +121,15 @@ std::vector<report::HtmlLink> links_of(const fs::path& folder, const Job& job) {
 // Returns the words about a series: its verdict and warnings, or why it has none.
 std::string words_of(const Line& line) {
   std::vector<std::string> words;
-  for (const std::string& text : {line.state.reason, line.verdict})
+  for (const std::string& text : {line.state.reason, line.run.verdict})
     if (!text.empty()) words.push_back(text);
-  for (const std::string& warning : line.warnings) words.push_back("Warning: " + warning);
+  for (const std::string& warning : line.run.warnings) words.push_back("Warning: " + warning);
   return fmt::format("{}", fmt::join(words, "\n"));
 }
 
 std::string mark_of(const Line& line) {
   if (line.state.progress == Progress::kFailed) return "bad";
-  return line.warnings.empty() ? "" : "warned";
+  return line.run.warnings.empty() ? "" : "warned";
 }
 
 std::vector<report::HtmlCell> page_row(const fs::path& folder, const Line& line) {
@@ -155,7 +146,7 @@ std::vector<report::HtmlCell> page_row(const fs::path& folder, const Line& line)
           {.text = has_run ? base::time_text(costs.core_seconds) : "", .mark = {}},
           {.text = has_run ? number(static_cast<double>(costs.peak_bytes) / kGibibyte, 2) : "",
            .mark = {}},
-          {.text = optional_number(line.held_out_error, 3), .mark = {}},
+          {.text = optional_number(line.run.held_out_error, 3), .mark = {}},
           {.text = {}, .mark = {}, .links = links_of(folder, *line.job)}};
 }
 

@@ -201,6 +201,11 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
   add_version_flag(program);
   program.formatter(std::make_shared<HelpFormatter>());
   program.require_subcommand(1);
+  add_help_all(program);
+  program.footer(
+      "`tomofield COMMAND --help` shows what most people use, and `--help-all` in its place shows "
+      "all.\n"
+      "Example: tomofield reconstruct TS_01/ -o TS_01.mrc   (the folder of an eTomo project)");
   std::vector<Setting> origins;
   add_commands(program, processes, origins);
   try {

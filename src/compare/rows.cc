@@ -23,13 +23,9 @@ namespace fs = std::filesystem;
 constexpr const char* kAdvice =
     "give another folder with -o, or --overwrite to make everything in this one again";
 
-// Returns what `read` makes of a JSON file. Mistakes in the file are errors that name it.
-template <typename Read>
-auto read_json(const fs::path& path, const Read& read) {
-  return io::read_record(path, read, [&](const std::string& why) {
-    return fmt::format("'{}' is not what this comparison wrote ({}): {}", path.string(), why,
-                       kAdvice);
-  });
+Error not_of_this_comparison(const fs::path& file, const std::string& why) {
+  return Error(
+      fmt::format("'{}' is not what this comparison wrote ({}): {}", file.string(), why, kAdvice));
 }
 
 std::string command_text(const json& command) {
@@ -90,6 +86,16 @@ base::Costs costs_until_now(const Row& row) {
   return row.state.costs;
 }
 
+// Returns what the JSON file of a finished run says.
+record::RunSummary summary_of(const Row& row) {
+  const fs::path file = paths_of(row).json;
+  try {
+    return record::read_summary(file);
+  } catch (const Error& fault) {
+    throw not_of_this_comparison(file, fault.what());
+  }
+}
+
 // Runs one method. Returns false if it was stopped.
 bool run(const fs::path& program, const RunHooks& hooks, Row& row) {
   const fs::path log = log_of(row);
@@ -133,12 +139,15 @@ json origin_of(const std::vector<std::string>& command, const std::vector<fs::pa
 RowState read_row(const fs::path& file, const json& origin) {
   if (!fs::exists(file)) return {};
   std::vector<std::string> differences;
-  const RowState state = read_json(file, [&](const json& row) {
+  const auto read = [&](const json& row) {
     differences = changes(row.at("origin"), origin);
     return RowState{row.at("progress"),
                     {io::number_at(row, "core_seconds", 0, base::kLargestNumber),
                      io::number_at(row, "wall_seconds", 0, base::kLargestNumber),
                      io::integer_at(row, "peak_bytes", 0, INT64_MAX)}};
+  };
+  const RowState state = io::read_record(file, read, [&](const std::string& why) {
+    return std::string(not_of_this_comparison(file, why).what());
   });
   if (differences.empty()) return state;
   throw Error(fmt::format("what '{}' tells of cannot be kept: {}: {}", file.string(),
@@ -151,10 +160,6 @@ void write_row(const fs::path& file, const json& origin, const RowState& state) 
                         {"core_seconds", state.costs.core_seconds},
                         {"wall_seconds", state.costs.wall_seconds},
                         {"peak_bytes", state.costs.peak_bytes}});
-}
-
-json read_metrics(const fs::path& file) {
-  return read_json(file, [](const json& document) { return document.at("metrics"); });
 }
 
 std::vector<Row> new_rows(const std::vector<Run>& runs, const fs::path& folder) {
@@ -204,7 +209,7 @@ bool run_rows(const fs::path& program, const RunHooks& hooks, std::vector<Row>& 
     if (!is_there && hooks.must_stop()) return false;
     if (hooks.run_starts) hooks.run_starts(row.run, is_there);
     if (!is_there && !run(program, hooks, row)) return false;
-    row.metrics = read_metrics(paths_of(row).json);
+    row.summary = summary_of(row);
     require_one_grid({rows.front().run.name, read_grid(rows.front().volume)},
                      {row.run.name, read_grid(row.volume)});
   }

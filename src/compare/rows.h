@@ -10,6 +10,7 @@
 
 #include "base/system/child_process.h"
 #include "compare/methods.h"
+#include "record/run_summary_record.h"
 
 namespace tomofield::compare {
 
@@ -42,9 +43,6 @@ RowState read_row(const std::filesystem::path& file, const nlohmann::json& origi
 void write_row(const std::filesystem::path& file, const nlohmann::json& origin,
                const RowState& state);
 
-/// Returns the metrics in the JSON file of a method. Throws Error if there are none.
-nlohmann::json read_metrics(const std::filesystem::path& file);
-
 /// A run of a method.
 struct Run {
   std::string name;  ///< the name of its files
@@ -60,7 +58,7 @@ struct Row {
   std::filesystem::path volume;
   nlohmann::json origin;  ///< origin_of() the run
   RowState state;
-  nlohmann::json metrics = nullptr;  ///< the metrics in the method's JSON, once it is finished
+  record::RunSummary summary = {};  ///< once it is finished
 };
 
 struct RunHooks {

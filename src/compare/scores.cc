@@ -98,11 +98,7 @@ std::vector<report::Curve> add_correlation(std::span<const Row> rows,
 
 void add_held_out_errors(std::span<const Row> rows, Table& table) {
   Metrics errors;
-  for (const Row& row : rows) {
-    const auto held_out = row.metrics.value("held_out", nlohmann::json());
-    errors.push_back(held_out.is_object() ? std::optional(held_out.at("error").get<double>())
-                                          : std::nullopt);
-  }
+  for (const Row& row : rows) errors.push_back(row.summary.held_out_error);
   table.add({"held_out_error", "held-out error", Better::kLower, 4}, errors);
 }
 

@@ -9,12 +9,6 @@ bool is_better(Column::Better better, double a, double b) {
   return better == Column::Better::kHigher ? a > b : a < b;
 }
 
-std::optional<double> number(const nlohmann::json& metrics, const char* key) {
-  const auto found = metrics.find(key);
-  if (found == metrics.end() || !found->is_number()) return std::nullopt;
-  return found->get<double>();
-}
-
 std::string cell_text(const std::optional<double>& value, int digits) {
   return value ? fmt::format("{:.{}f}", *value, digits) : "–";
 }
@@ -52,7 +46,7 @@ Table table_of_costs(const std::vector<Row>& rows) {
     core.push_back(row.state.costs.core_seconds);
     wall.push_back(row.state.costs.wall_seconds);
     memory.push_back(static_cast<double>(row.state.costs.peak_bytes) / (1 << 20));
-    const auto count = number(row.metrics, "parameters");
+    const auto count = row.summary.num_parameters;
     parameters.push_back(count ? std::optional(*count / 1e6) : std::nullopt);
   }
   table.add({"core_seconds", "core‑s", Column::Better::kLower, 1}, core);

@@ -31,7 +31,8 @@ options that people use, `--help-all` shows all of them. The other commands (`ba
   or of a section of `tomofield::Options` (`options.fit.epochs`). `field` is `options.field.kind`.
 - The key is the name in the JSON beside a tomogram, under `options`, where every option has the
   value that was used.
-- An option with an automatic default takes the word `auto` as well.
+- An option with an automatic default takes the word `auto` as well, on the command line and in a
+  configuration file. In Python `None` stands for it.
 - Unbinned pixels are those of the aligned view before `--bin`; binned pixels are those after it.
 - Only the command line has `--threads N` (default: the processors that this process may use, or
   `OMP_NUM_THREADS`; the result is the same for any number), `--dry-run` (checks everything and prints

@@ -1,7 +1,10 @@
 #include "option_table/setting.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <utility>
 
 #include "base/utf8.h"
@@ -11,8 +14,9 @@ namespace tomofield::option_table {
 
 void note_settings(std::vector<Setting> settings, Choices& choices) {
   for (const Row& row : all_rows()) {
-    const bool is_set = std::ranges::any_of(
-        settings, [&](const Setting& setting) { return row.flag == setting.option; });
+    const bool is_set = std::ranges::any_of(settings, [&](const Setting& setting) {
+      return row.flag == setting.option && setting.instead.empty();
+    });
     if (!is_set) continue;
     visit_value(row, choices, []<typename T>(T& value) {
       if constexpr (requires { value.origin(); }) value = {*value, Origin::kProject};
@@ -21,17 +25,17 @@ void note_settings(std::vector<Setting> settings, Choices& choices) {
   choices.options.settings = std::move(settings);
 }
 
-std::vector<Setting> settings_in_use(const Choices& choices) {
-  std::vector<Setting> in_use = choices.options.settings;
-  std::erase_if(in_use, [&](const Setting& setting) {
-    if (rows_of_flag(setting.option).empty()) return false;  // an option of another command
+void note_replaced_settings(Choices& choices) {
+  for (Setting& setting : choices.options.settings) {
+    const std::span<const Row> rows = rows_of_flag(setting.option);
+    if (rows.empty() || !setting.instead.empty()) continue;  // an option of another command
     Choices as_set = choices;
     set_flag_from_text(setting.option, setting.value, as_set);
-    return std::ranges::any_of(rows_of_flag(setting.option), [&](const Row& row) {
-      return text_of(row, as_set) != text_of(row, choices);
-    });
-  });
-  return in_use;
+    const bool is_replaced = std::ranges::any_of(
+        rows, [&](const Row& row) { return text_of(row, as_set) != text_of(row, choices); });
+    if (is_replaced)
+      setting.instead = fmt::format("{} {}", setting.option, flag_text_of(setting.option, choices));
+  }
 }
 
 nlohmann::json settings_json(std::span<const Setting> settings) {
@@ -42,6 +46,7 @@ nlohmann::json settings_json(std::span<const Setting> settings) {
                     {"file", base::utf8_text(setting.file.string())},
                     {"entry", base::utf8_text(setting.entry)}});
     if (!setting.row.empty()) list.back()["row"] = base::utf8_text(setting.row);
+    if (!setting.instead.empty()) list.back()["instead"] = base::utf8_text(setting.instead);
   }
   return list;
 }

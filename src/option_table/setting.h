@@ -12,14 +12,15 @@
 namespace tomofield::option_table {
 
 /// Notes the settings that the files of a project made among the options, and gives the values that
-/// they set their origin.
+/// they set their origin, but for those in whose place something else holds.
 void note_settings(std::vector<Setting> settings, Choices& choices);
 
-/// Returns those of Options::settings whose values the options still have: a user may have gone
-/// over others.
-std::vector<Setting> settings_in_use(const Choices& choices);
+/// Notes in Options::settings what holds in place of those whose values the options no longer have,
+/// because a user has gone over them.
+void note_replaced_settings(Choices& choices);
 
-/// Returns settings as an array of objects with the members of Setting, for the metrics.
+/// Returns settings as an array of objects with the members of Setting, for the metrics. Those that
+/// are empty for most settings (row, instead) are left out there.
 nlohmann::json settings_json(std::span<const Setting> settings);
 
 /// An option as somebody gave it, on the command line or in a table of series.

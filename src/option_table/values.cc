@@ -262,6 +262,12 @@ std::optional<std::string> text_of(const Row& row, const Choices& choices) {
   return text && text->empty() ? std::nullopt : text;
 }
 
+std::string flag_text_of(std::string_view flag, const Choices& choices) {
+  std::vector<std::string> texts;
+  for (const Row& row : rows_of_flag(flag)) texts.push_back(text_of(row, choices).value_or("none"));
+  return fmt::format("{}", fmt::join(texts, ","));
+}
+
 std::string label_of(const Row& row) {
   if (!row.label.empty()) return std::string(row.label);
   const Choices none;
@@ -324,7 +330,9 @@ Origin origin_of(const Row& row, const Choices& choices) {
       return value.origin();
     } else {
       Choices usual;
-      return value == std::get<Reference<T>>(row.member)(usual) ? Origin::kDefault : Origin::kGiven;
+      const bool is_usual = value == std::get<Reference<T>>(row.member)(usual);
+      const bool is_named = std::ranges::count(choices.options.given, row.flag) > 0;
+      return is_usual && !is_named ? Origin::kDefault : Origin::kGiven;
     }
   });
 }

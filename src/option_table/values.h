@@ -26,6 +26,9 @@ std::string set_flag_from_text(std::string_view flag, const std::string& text, C
 /// automatically or is an empty text.
 std::optional<std::string> text_of(const Row& row, const Choices& choices);
 
+/// Returns the value of a flag as set_flag_from_text() reads it; "none" where nothing is chosen.
+std::string flag_text_of(std::string_view flag, const Choices& choices);
+
 /// Returns what stands for the value of an option in the help: "FILE", "dark|bright".
 std::string label_of(const Row& row);
 
@@ -40,8 +43,8 @@ std::vector<std::string> range_faults(const Options& options);
 /// value are null.
 nlohmann::json to_json(const Choices& choices);
 
-/// Returns where the value of an option comes from. One that is no Choice is given if it is not its
-/// default.
+/// Returns where the value of an option comes from. One that is no Choice is given if
+/// Options::given names its flag, or if it is not its default.
 Origin origin_of(const Row& row, const Choices& choices);
 
 /// Fills in the options whose automatic value depends on the contrast: the scale of the views and

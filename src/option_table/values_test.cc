@@ -153,6 +153,31 @@ TEST(OptionTable, ValuesSayWhereTheyComeFrom) {
   note_settings({{"--tv", "3", "a.toml", "tv"}}, choices);
   EXPECT_EQ(origin("fit.density_variation", choices), Origin::kProject);
   EXPECT_EQ(choices.options.settings.size(), 1u);
+  EXPECT_EQ(origin("input.bin", choices), Origin::kDefault);
+  choices.options.given = {"--bin"};  // with the default value
+  EXPECT_EQ(origin("input.bin", choices), Origin::kGiven);
+}
+
+TEST(OptionTable, SettingsSayWhatHoldsInTheirPlace) {
+  Choices choices;
+  choices.options.specimen.thickness = 300;
+  choices.options.specimen.axis_x = 12;
+  note_settings({{"--thickness", "300", "tilt.com", "THICKNESS"},
+                 {"--center", "12", "tilt.com", "OFFSET"},
+                 {"--bin", "2", "tilt.com", "IMAGEBINNED", "", "--angpix 10"},
+                 {"--cs", "2.7", "ctfcorrection.com", "SphericalAberration"}},
+                choices);
+  const auto instead = [&] {
+    note_replaced_settings(choices);
+    std::string all;
+    for (const Setting& setting : choices.options.settings) all += setting.instead + ";";
+    return all;
+  };
+  EXPECT_EQ(instead(), ";;--angpix 10;--cs none;");
+  choices.options.specimen.thickness = 200;
+  choices.options.specimen.axis_x = 13;
+  choices.options.specimen.axis_z = 3.5;
+  EXPECT_EQ(instead(), "--thickness 200;--center 13,3.5;--angpix 10;--cs none;");
 }
 
 TEST(OptionTable, TextsThatCannotBeReadSayWhatIsWanted) {

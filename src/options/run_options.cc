@@ -62,8 +62,9 @@ constexpr double kLeastFactor = 0.05, kMostFactor = 20;
 }  // namespace
 
 Options resolve(const SeriesFiles& files, const Options& requested) {
-  Options options = requested;
-  options.settings = option_table::settings_in_use({files, requested});
+  option_table::Choices choices{files, requested};
+  option_table::note_replaced_settings(choices);
+  Options options = std::move(choices.options);
   option_table::choose_by_contrast(options);
   choose_field(options);
   choose_schedule(files, options);
@@ -102,11 +103,10 @@ ReconstructOptions ReconstructOptions::with_open_prior() const {
 
 int ReconstructOptions::num_trials(int num_fitted_views,
                                    const tune::OpenSettings& to_choose) const {
-  constexpr int kMinViews = 12;
   if (fit.tune)
     return tune::expected_trials(
         {.penalty = to_choose.variation, .rank = *field.kind == FieldKind::kVm});
-  if (fit.engine != Engine::kSlab || num_fitted_views < kMinViews) return 0;
+  if (fit.engine != Engine::kSlab || num_fitted_views < kFewestViewsOfTrials) return 0;
   return tune::usual_trials(to_choose);
 }
 

@@ -23,6 +23,9 @@ namespace tomofield::options {
 /// out of range stay as they are; faults() names them.
 Options resolve(const SeriesFiles& files, const Options& requested);
 
+/// A series of fewer views cannot spare any of them for trials.
+constexpr int kFewestViewsOfTrials = 12;
+
 /// Everything that a reconstruction is made from: the options, resolved, and what the alignment
 /// before the fit adds to the files. run_options() makes it. Each layer takes its own section.
 struct ReconstructOptions : Options {
@@ -53,8 +56,8 @@ struct ReconstructOptions : Options {
   }
 
   /// Returns the expected number of trials before the fit, which choose the settings `to_choose`; 0
-  /// means that nothing is to be chosen. A series of few views cannot spare any of them for trials,
-  /// and trials cannot predict the rays of raw views.
+  /// means that nothing is to be chosen, that there are too few views (kFewestViewsOfTrials), or
+  /// that trials cannot predict them, which are rays of raw views.
   int num_trials(int num_fitted_views, const tune::OpenSettings& to_choose) const;
   /// Returns a sentence for each option that is out of range or does not go with another one.
   std::vector<std::string> faults() const;

@@ -24,6 +24,8 @@ Model ModelAccess::make(output::Model model) {
   return Model(std::make_shared<Model::Impl>(Model::Impl{std::move(model)}));
 }
 
+const output::Model& ModelAccess::model(const Model& model) { return model.impl_->model; }
+
 namespace {
 
 bool is_usable_voxel(double voxel_px) { return std::isfinite(voxel_px) && voxel_px > 0; }
@@ -41,15 +43,23 @@ void require_usable(const SampleBox& box) {
         box.size[0], box.size[1], box.size[2], box.voxel_px));
 }
 
-// Turns densities into values of the input's kind and contrast, or of the inverted contrast.
-void to_output(const output::ModelInfo& model, std::vector<float>& values, bool invert = false) {
+}  // namespace
+
+field::OrientedBox oriented_box(const SampleBox& box) {
+  require_usable(box);
+  const auto& [rot, tilt, psi] = box.euler_deg;
+  return {.centre_px = box.centre_px,
+          .size = box.size,
+          .voxel_px = box.voxel_px,
+          .field_from_box = field::rotation_from_euler(rot, tilt, psi)};
+}
+
+namespace output {
+
+void to_output(const ModelInfo& model, std::vector<float>& values, bool invert) {
   const auto scale = static_cast<float>(invert ? -model.output_scale() : model.output_scale());
   for (float& value : values) value = scale * value + 0.0f;  // no −0
 }
-
-}  // namespace
-
-namespace output {
 
 Tomogram sample_tomogram(const output::Model& model, bool invert) {
   const field::OrientedBox box = output::region_box(model, 1.0);
@@ -82,14 +92,8 @@ SampleBox Model::region(double voxel_px) const {
 }
 
 std::vector<float> Model::sample(const SampleBox& box) const {
-  require_usable(box);
-  const auto& [rot, tilt, psi] = box.euler_deg;
-  auto values = output::sample_box(impl_->model,
-                                   {.centre_px = box.centre_px,
-                                    .size = box.size,
-                                    .voxel_px = box.voxel_px,
-                                    .field_from_box = field::rotation_from_euler(rot, tilt, psi)});
-  to_output(impl_->model, values);
+  auto values = output::sample_box(impl_->model, oriented_box(box));
+  output::to_output(impl_->model, values);
   return values;
 }
 
@@ -101,7 +105,7 @@ std::vector<float> Model::sample_points(std::span<const Point> points) const {
                       "finite",
                       point[0], point[1], point[2]));
   std::vector<float> values = output::sample_points(impl_->model, points);
-  to_output(impl_->model, values);
+  output::to_output(impl_->model, values);
   return values;
 }
 

@@ -110,13 +110,21 @@ int most_vertices(const fit::Domain& domain) {
 
 RunPlan plan_run(const tilt_series::PlannedSeries& series, const options::ReconstructOptions& given,
                  const distributed::Communicator& processes) {
-  const options::ReconstructOptions options = given.with_open_prior();
   if (processes.size() > 1) base::require_no_faults(given.faults_of_job());
-  const measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
+  const measurement::Measurement plan = measurement::plan_measurement(series, given.specimen);
+  RunPlan run;
+  const tune::OpenSettings open = given.open_settings();
+  // Only the views tell whether there is a background or an undecided bead.
+  run.num_trials = given.num_trials(
+      num_fitted_views(plan, given.fit),
+      {.variation = open.variation, .spikes = open.spikes, .view_scale = open.view_scale});
+  run.has_too_few_views_for_trials = open.any() && run.num_trials == 0 &&
+                                     given.num_trials(options::kFewestViewsOfTrials, open) > 0;
+  if (run.num_trials > 0) require_views_for_trials(plan, given.fit);
+  const options::ReconstructOptions options = run.num_trials > 0 ? given.with_open_prior() : given;
   const fit::Domain domain = plan.ray_geometry
                                  ? fit::make_domain(*plan.ray_geometry, plan.roi, options.field)
                                  : fit::make_domain(plan.geometry, plan.roi, options.field);
-  RunPlan run;
   run.num_views = plan.geometry.num_views();
   run.view_width = plan.geometry.width;
   run.view_height = plan.geometry.height;
@@ -128,12 +136,6 @@ RunPlan plan_run(const tilt_series::PlannedSeries& series, const options::Recons
   run.num_parameters = max_parameters(domain, options.field, options.field.kind);
   run.stages = fit::make_stages(options.field, options.fit);
   const fit::Stage& last = run.stages.back();
-  const tune::OpenSettings open = options.open_settings();
-  // Only the views tell whether there is a background or an undecided bead.
-  run.num_trials = options.num_trials(
-      num_fitted_views(plan, options.fit),
-      {.variation = open.variation, .spikes = open.spikes, .view_scale = open.view_scale});
-  if (run.num_trials > 0) require_views_for_trials(plan, options.fit);
   run.steps_an_epoch = steps_an_epoch(plan, options.fit);
   run.num_steps = (last.first_epoch + last.epochs) * run.steps_an_epoch;
   run.tiles = plan_tiles({series, plan, domain, options, processes});

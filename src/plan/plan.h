@@ -24,6 +24,7 @@ struct RunPlan {
   int most_vertices = 0;           ///< along an axis of a leaf
   std::size_t num_parameters = 0;  ///< max. during the last stage
   int num_trials = 0;              ///< expected number of short fits that choose settings
+  bool has_too_few_views_for_trials = false;  ///< which would else choose settings
   std::vector<fit::Stage> stages;
   int steps_an_epoch = 0;
   std::int64_t num_steps = 0;    ///< of all stages of a fit

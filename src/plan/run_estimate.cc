@@ -197,7 +197,7 @@ std::size_t scratch_bytes(const tilt_series::PlannedSeries& series,
 
 RunEstimate estimate_run(const tilt_series::PlannedSeries& series,
                          const options::ReconstructOptions& given, const RunPlan& run) {
-  const options::ReconstructOptions options = given.with_open_prior();
+  const options::ReconstructOptions options = run.num_trials > 0 ? given.with_open_prior() : given;
   measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
   plan.transfers = measurement::view_transfers(options.input(), options.specimen.hand, series);
   RunEstimate estimate;

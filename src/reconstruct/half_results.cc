@@ -9,7 +9,6 @@
 #include "base/log.h"
 #include "base/utf8.h"
 #include "baseline/run_baseline.h"
-#include "evaluate/evaluation_record.h"
 #include "evaluate/resolution/block_fsc.h"
 #include "evaluate/resolution/local_resolution.h"
 #include "evaluate/uncertainty.h"
@@ -23,12 +22,10 @@
 #include "report/choice_plot.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
-#include "verdict/verdict_record.h"
 
 namespace tomofield::reconstruction {
 namespace {
 
-using nlohmann::json;
 using tilt_series::Half;
 
 // Holds the resolution that a comparison of the volumes of both halves gives.
@@ -112,38 +109,34 @@ void write_fsc_plot(const Agreement& found, const std::filesystem::path& path) {
   report::write_curve_plot(report::fsc_axes(fsc.frequency_per_A.back()), curves, path);
 }
 
-json halves_json(const Run& run, const FinishedFits& fits, const Agreement& found) {
-  const auto text = [](const std::filesystem::path& path) {
-    return base::utf8_text(path.string());
+record::HalvesRecord halves_record(const Run& run, const FinishedFits& fits,
+                                   const Agreement& found) {
+  const auto of_half = [&](Half half) {
+    return record::HalvesRecord::OfHalf{paths_of(run, half).volume, paths_of(run, half).model,
+                                        fits.halves[static_cast<std::size_t>(half)]};
   };
-  const auto fsc_json = [&](const evaluate::Fsc& fsc, const std::filesystem::path& even,
-                            const std::filesystem::path& odd) {
-    return evaluate::fsc_json(
-        fsc, {.first = even, .second = odd, .mask = {}, .box = {}, .tilts = tilt_range(run)});
+  const auto fsc_of = [&](const evaluate::Fsc& fsc,
+                          std::filesystem::path output::OutputPaths::OfHalf::*volume) {
+    return record::FscRecord{fsc,
+                             {.first = paths_of(run, Half::kEven).*volume,
+                              .second = paths_of(run, Half::kOdd).*volume,
+                              .mask = {},
+                              .box = {},
+                              .tilts = tilt_range(run)}};
   };
-  const output::OutputPaths::OfHalf &even = paths_of(run, Half::kEven),
-                                    &odd = paths_of(run, Half::kOdd);
+  using OfHalf = output::OutputPaths::OfHalf;
   const double voxel_A = run.measurement.pixel_size_A;
-  json all = {{"of", run.options.fit.split_tilts ? "tilts" : "frames"},
-              {"fsc", fsc_json(found.fsc, even.volume, odd.volume)},
-              {"local_resolution",
-               {{"file", text(run.paths.local_resolution)},
-                {"window_px", evaluate::kResolutionWindow},
-                {"threshold", evaluate::kLocalThreshold},
-                {"median_A", voxel_A * found.local.percentile_px(50)},
-                {"finest_tenth_A", voxel_A * found.local.percentile_px(10)},
-                {"coarsest_tenth_A", voxel_A * found.local.percentile_px(90)}}},
-              {"uncertainty",
-               {{"file", text(run.paths.uncertainty)}, {"box_px", evaluate::kUncertaintyBox}}}};
-  for (const Half half : tilt_series::kBothHalves)
-    all[name_of(half)] = {{"volume", text(paths_of(run, half).volume)},
-                          {"model", text(paths_of(run, half).model)},
-                          {"metrics", fits.halves[static_cast<std::size_t>(half)].metrics}};
-  if (found.linear_fsc)
-    all["linear"] = {{"even", text(even.linear_volume)},
-                     {"odd", text(odd.linear_volume)},
-                     {"fsc", fsc_json(*found.linear_fsc, even.linear_volume, odd.linear_volume)}};
-  return all;
+  record::HalvesRecord record{.are_of_tilts = run.options.fit.split_tilts,
+                              .halves = {of_half(Half::kEven), of_half(Half::kOdd)},
+                              .fsc = fsc_of(found.fsc, &OfHalf::volume),
+                              .linear = {},
+                              .local_resolution = run.paths.local_resolution,
+                              .uncertainty = run.paths.uncertainty,
+                              .median_A = voxel_A * found.local.percentile_px(50),
+                              .finest_tenth_A = voxel_A * found.local.percentile_px(10),
+                              .coarsest_tenth_A = voxel_A * found.local.percentile_px(90)};
+  if (found.linear_fsc) record.linear = fsc_of(*found.linear_fsc, &OfHalf::linear_volume);
+  return record;
 }
 
 std::string crossing_text(const evaluate::Fsc& fsc, double threshold) {
@@ -190,8 +183,8 @@ void write_all(const Run& run, const FinishedFits& fits, const std::optional<tun
   if (tuned) report::write_choice_plot(*tuned, run.paths.choice_picture);
   if (fits.held_out_view)
     report::write_held_out_picture(*fits.held_out_view, run.paths.held_out_picture);
-  results.metrics["halves"] = halves_json(run, fits, found);
-  io::write_json(run.paths.json, results.metrics);
+  results.record.halves = halves_record(run, fits, found);
+  io::write_json(run.paths.json, record::to_json(results.record));
   write_pages(run, outputs, results);
   remove_stale_files(run.options, outputs);
   outputs.commit();
@@ -202,15 +195,10 @@ void write_all(const Run& run, const FinishedFits& fits, const std::optional<tun
 
 RunResult write_half_results(const Run& run, const FinishedFits& fits,
                              const std::optional<tune::TunedFit>& tuned) {
-  verdict::Verdict verdict = fits.whole.verdict;
-  verdict.seconds = fits.halves.back().verdict.seconds;  // of all three fits
-  verdict.peak_GiB = fits.halves.back().verdict.peak_GiB;
-  json metrics = fits.whole.metrics;
-  metrics["verdict"] = verdict::verdict_json(verdict);
-  RunResult results{.model = {},
-                    .metrics = run_json(run.options, std::move(metrics)),
-                    .verdict = std::move(verdict),
-                    .bead_masking = run.measurement.masks.bead_masking};
+  record::FitRecord whole = fits.whole;
+  whole.verdict.seconds = fits.halves.back().verdict.seconds;  // of all three fits
+  whole.verdict.peak_GiB = fits.halves.back().verdict.peak_GiB;
+  RunResult results{.model = {}, .record = run_record(run.options, std::move(whole))};
   run.processes.run_collectively([&] {
     if (!run.processes.is_root()) return;
     try {

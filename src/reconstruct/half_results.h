@@ -12,9 +12,9 @@ namespace tomofield::reconstruction {
 
 /// The fits of all data and of both halves after their last step.
 struct FinishedFits {
-  Examination whole;
+  record::FitRecord whole;
   std::optional<measurement::PredictedView> held_out_view;  ///< as the fit of all data predicts it
-  std::array<Examination, 2> halves;                        ///< [tilt_series::Half]
+  std::array<record::FitRecord, 2> halves;                  ///< [tilt_series::Half]
 };
 
 /// Writes the results of three finished fits, whose models are in their files: the volume of all

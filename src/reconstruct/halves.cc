@@ -40,7 +40,7 @@ struct Part {
 
 // Holds what a finished fit leaves.
 struct FinishedPart {
-  Examination findings;
+  record::FitRecord findings;
   std::vector<measurement::ViewModel> views;
   std::optional<measurement::PredictedView> held_out_view;
   bool took_steps = false;
@@ -50,28 +50,31 @@ struct FinishedPart {
 // a checkpoint then.
 std::optional<FinishedPart> fit_part(const Run& run, const std::optional<tune::TunedFit>& tuned,
                                      const Part& part, bool resumes) {
-  base::log_info(fmt::format("{}: {} views", part.name, part.measurement.num_fitted_views()));
-  FitRecord record{
+  const bool lacks_prior = !part.may_learn && run.options.fit.prior != Prior::kTv;
+  base::log_info(fmt::format(
+      "{}: {} views{}", part.name, part.measurement.num_fitted_views(),
+      lacks_prior ? ", without the learned prior, which would add the same to both halves" : ""));
+  FitOutcome outcome{
       {checkpoint::fingerprint_of(run.options, part.measurement, run.processes), tuned}};
   const base::ProgressSink progress =
       base::part_of(run.observer.fit, part.share.begin, part.share.size, part.name);
   const FitRun made = run_fit(run, {.measurement = part.measurement,
                                     .model = part.model,
-                                    .origin = record.origin,
+                                    .origin = outcome.origin,
                                     .resumes = resumes,
                                     .progress = progress,
                                     .kept_views = part.kept_views,
                                     .may_learn = part.may_learn});
   if (made.was_stopped) return std::nullopt;
-  record.seconds = made.seconds;
+  outcome.seconds = made.seconds;
   made.fit->free_optimizer();  // the verdict needs the memory
-  FinishedPart finished{.findings = examine(*made.fit, part.measurement, run, record),
+  FinishedPart finished{.findings = examine(*made.fit, part.measurement, run, outcome),
                         .views = made.fit->progress().views,
                         .held_out_view = {},
                         .took_steps = made.took_steps};
   finished.held_out_view = central_held_out_view(*made.fit, part.measurement, finished.findings);
   checkpoint::save_fit(part.model, *made.fit, checkpoint::model_info(part.measurement, run.options),
-                       checkpoint::progress_state(*made.fit, record.origin));
+                       checkpoint::progress_state(*made.fit, outcome.origin));
   return finished;
 }
 

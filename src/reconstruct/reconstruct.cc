@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -188,6 +187,11 @@ plan::RunPlan make_plan(const tilt_series::PlannedSeries& series,
   plan::RunPlan plan;
   processes.run_collectively([&] {
     plan = plan::require_possible_run(series, options, processes);
+    if (plan.has_too_few_views_for_trials)
+      base::log_info(fmt::format(
+          "{} views are too few for trials, which leave some of them out and need {} or more: "
+          "what they would choose has its usual value (--tv-penalty, --tv and --prior give others)",
+          plan.num_views, options::kFewestViewsOfTrials));
     if (observer.planned) observer.planned(plan);
   });
   return plan;
@@ -217,18 +221,18 @@ checkpoint::FitOrigin origin_of(const Run& run, std::optional<tune::TunedFit> tu
 // Fits all views and writes the results.
 RunResult fit_all_views(const Run& run, const plan::TilePlan& tiles,
                         std::optional<tune::TunedFit> tuned) {
-  FitRecord record{.origin = origin_of(run, std::move(tuned))};
-  if (!run.options.field.budget.empty()) record.origin.tile_rows = tiles.rows;
+  FitOutcome outcome{.origin = origin_of(run, std::move(tuned))};
+  if (!run.options.field.budget.empty()) outcome.origin.tile_rows = tiles.rows;
   if (!run.options.run.resume) checkpoint::forget_old_tiles(run.options, run.processes);
-  if (tiles.is_used()) return fit_by_tiles(run, tiles, record);
+  if (tiles.is_used()) return fit_by_tiles(run, tiles, outcome);
   const FitRun made = run_fit(run, {.measurement = run.measurement,
                                     .model = run.paths.model,
-                                    .origin = record.origin,
+                                    .origin = outcome.origin,
                                     .resumes = run.options.run.resume,
                                     .progress = run.observer.fit});
   if (made.was_stopped) return {.outcome = Outcome::kStopped, .checkpoint = run.paths.model};
-  record.seconds = made.seconds;
-  return finish(*made.fit, run, record);
+  outcome.seconds = made.seconds;
+  return finish(*made.fit, run, outcome);
 }
 
 }  // namespace
@@ -245,8 +249,10 @@ RunResult run(options::ReconstructOptions options, const Observer& observer,
   std::optional<tune::TunedFit> tuned;
   if (!choose_settings(run, tuned)) return {.outcome = Outcome::kStoppedTuning};
   processes.run_collectively([&] { show_trials(run, tuned); });
-  if (run.options.makes_halves()) return reconstruct_halves(run, tuned);
-  return fit_all_views(run, plan.tiles, std::move(tuned));
+  RunResult result = run.options.makes_halves() ? reconstruct_halves(run, tuned)
+                                                : fit_all_views(run, plan.tiles, std::move(tuned));
+  result.options = run.options;
+  return result;
 }
 
 Preview preview(const options::ReconstructOptions& options,
@@ -261,17 +267,20 @@ Preview preview(const options::ReconstructOptions& options,
   return preview;
 }
 
-std::optional<nlohmann::json> choose(options::ReconstructOptions options, const Observer& observer,
-                                     const distributed::Communicator& processes) {
+bool choose(const std::filesystem::path& file, options::ReconstructOptions options,
+            const Observer& observer, const distributed::Communicator& processes) {
   const std::vector<io::OutputLock> locks = claim(options, processes);
   plan::check_before_alignment(options, processes);
-  if (!align_views(options, observer, processes)) return std::nullopt;
+  if (!align_views(options, observer, processes)) return false;
   const tilt_series::TiltSeries series(options.input(), processes);
   make_plan(series, options, observer, processes);
   Run run = begin_run(series, std::move(options), observer, processes);
   std::optional<tune::TunedFit> tuned;
-  if (!choose_settings(run, tuned)) return std::nullopt;
-  return tuned ? tune::tuning_json(*tuned) : nlohmann::json(nullptr);
+  if (!choose_settings(run, tuned)) return false;
+  processes.run_collectively([&] {
+    if (processes.is_root()) tune::write_choice(file, tuned);
+  });
+  return true;
 }
 
 bool align(options::ReconstructOptions& options, const Observer& observer) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 
 #include "distributed/communicator.h"
@@ -35,12 +34,12 @@ struct Preview {
 Preview preview(const options::ReconstructOptions& options,
                 const distributed::Communicator& processes = distributed::Communicator::alone());
 
-/// Goes on as run() does up to the trials and ends there. Returns the choice and the trials as
-/// tuning_json() writes them, and null if the options leave nothing to trials. Returns nothing if a
-/// stop was requested.
-std::optional<nlohmann::json> choose(
-    options::ReconstructOptions options, const Observer& observer,
-    const distributed::Communicator& processes = distributed::Communicator::alone());
+/// Goes on as run() does up to the trials and ends there. Writes the choice and the trials as JSON
+/// (tune/trial_record.h), or null if the options leave nothing to trials. Returns false if a stop
+/// was requested.
+bool choose(const std::filesystem::path& file, options::ReconstructOptions options,
+            const Observer& observer,
+            const distributed::Communicator& processes = distributed::Communicator::alone());
 
 /// Aligns the views of a series, writes the alignment for other programs, and ends there. Returns
 /// false if a stop was requested. Throws Error for bad input.

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,11 +20,8 @@
 #include "checkpoint/checkpoint.h"
 #include "compact/budget.h"
 #include "compact/compress.h"
-#include "evaluate/artefacts.h"
-#include "evaluate/evaluation_record.h"
 #include "io/json.h"
 #include "io/saving/output_set.h"
-#include "option_table/setting.h"
 #include "options/run_options.h"
 #include "output/metrics_record.h"
 #include "output/output_paths.h"
@@ -35,9 +31,7 @@
 #include "report/choice_plot.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
-#include "tune/trial_record.h"
 #include "verdict/judge.h"
-#include "verdict/verdict_record.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -51,16 +45,6 @@ measurement::PredictedView view_near_zero(const fit::Fit& fit,
   });
   const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
   return fit.predict(std::span(&*nearest, 1), std::span(&model, 1)).front();
-}
-
-nlohmann::json held_out_json(const fit::Fit& fit, const measurement::Measurement& series,
-                             const options::ReconstructOptions& options,
-                             const std::optional<measurement::ViewErrors>& errors) {
-  if (!errors) return nullptr;
-  nlohmann::json json =
-      output::report_held_out(*errors, series.geometry.tilt_deg, options.fit.patience > 0);
-  json["error_by_epoch"] = fit.progress().held_out_error;
-  return json;
 }
 
 // Returns the rows of the volume that this process works on. The views as recorded of a process
@@ -129,7 +113,7 @@ void write_results(RunResult& results, const ResultFiles& files) {
   }
   write_all(writers, processes);
   processes.run_collectively([&] {
-    if (processes.is_root()) io::write_json(paths.json, results.metrics);
+    if (processes.is_root()) io::write_json(paths.json, record::to_json(results.record));
   });
 }
 
@@ -187,7 +171,7 @@ void make_compact(const compact::Budget& budget, RunResult& results) {
       [&](const compact::CodedField& coded) { return output::coded_file_size(coded, model); });
   results.model->field = std::move(made.field);
   results.model->coded = std::move(made.coded);
-  results.metrics["metrics"]["compact"] = output::compact_json(made.report, running.seconds());
+  results.record.compact = record::CompactRecord{made.report, running.seconds()};
 }
 
 // Does the same. If that fails, keeps the finished fit.
@@ -204,48 +188,46 @@ void make_compact_or_keep(const ResultFiles& files, std::optional<io::OutputSet>
 
 }  // namespace
 
-Examination examine(const fit::Fit& fit, const measurement::Measurement& measured, const Run& run,
-                    const FitRecord& record) {
-  Examination found;
-  found.metrics = output::metrics_json(fit, measured, record.seconds);
-  found.metrics["tv_weight"] = *options::with_denoise(run.options.fit).density_variation;
-  if (run.options.fit.hold_out > 0) {
+record::FitRecord examine(const fit::Fit& fit, const measurement::Measurement& measured,
+                          const Run& run, const FitOutcome& outcome) {
+  const options::ReconstructOptions& options = run.options;
+  record::FitRecord found{
+      .metrics = record::fit_metrics(
+          fit, measured, *options::with_denoise(options.fit).density_variation, outcome.seconds),
+      .verdict = {},
+      .alignment = options.alignment,
+      .tuned = outcome.origin.tuned};
+  std::optional<measurement::ViewErrors> held_out;
+  if (options.fit.hold_out > 0) {
     const base::TraceSpan span("score held-out views");
-    found.held_out = fit.held_out_error();
+    held_out = fit.held_out_error();
+    output::log_held_out(*held_out, options.fit.patience > 0);
+    found.metrics.held_out =
+        record::HeldOutMetrics{*held_out, options.fit.patience > 0, fit.progress().held_out_error};
   }
-  found.metrics["held_out"] = held_out_json(fit, measured, run.options, found.held_out);
-  found.metrics["processes"] = output::processes_json(fit, record.seconds);
-  const std::optional<tune::TunedFit>& tuned = record.origin.tuned;
   found.verdict = verdict::judge(
-      {fit, measured, run.options, tuned, run.alignment, volume_share(fit, measured).rows},
-      found.held_out);
-  found.metrics.update(
-      evaluate::artefacts_json(found.verdict.artefacts.speckle, found.verdict.artefacts.faces));
-  found.metrics["verdict"] = verdict::verdict_json(found.verdict);
-  found.metrics["alignment"] =
-      run.options.alignment ? alignment::to_json(*run.options.alignment) : nlohmann::json(nullptr);
-  found.metrics["tuning"] = tuned ? tune::tuning_json(*tuned) : nlohmann::json(nullptr);
+      {fit, measured, options, found.tuned, run.alignment, volume_share(fit, measured).rows},
+      held_out);
   return found;
 }
 
 std::optional<measurement::PredictedView> central_held_out_view(
-    const fit::Fit& fit, const measurement::Measurement& measured, const Examination& found) {
-  if (!found.held_out) return std::nullopt;
-  return view_near_zero(fit, measured, *found.held_out);
+    const fit::Fit& fit, const measurement::Measurement& measured, const record::FitRecord& found) {
+  if (!found.metrics.held_out) return std::nullopt;
+  return view_near_zero(fit, measured, found.metrics.held_out->errors);
 }
 
-nlohmann::json run_json(const options::ReconstructOptions& options, nlohmann::json metrics) {
-  return {{"tomofield", TOMOFIELD_VERSION},
-          {"options", options::options_json(options)},
-          {"origins", option_table::settings_json(options.settings)},
-          {"metrics", std::move(metrics)}};
+record::RunRecord run_record(const options::ReconstructOptions& options, record::FitRecord fit) {
+  return {.options = options::options_json(options),
+          .settings = options.settings,
+          .fit = std::move(fit)};
 }
 
-RunResult finish(fit::Fit& fit, const Run& run, const FitRecord& record) {
+RunResult finish(fit::Fit& fit, const Run& run, const FitOutcome& outcome) {
   const measurement::Measurement& measured = run.measurement;
-  const checkpoint::FitOrigin& origin = record.origin;
+  const checkpoint::FitOrigin& origin = outcome.origin;
   fit.free_optimizer();  // the verdict and a compact model need the memory
-  Examination found = examine(fit, measured, run, record);
+  record::FitRecord found = examine(fit, measured, run, outcome);
   std::optional<measurement::PredictedView> view;
   if (run.writes_files()) view = central_held_out_view(fit, measured, found);
   const output::VolumeShare share = volume_share(fit, measured);
@@ -256,9 +238,7 @@ RunResult finish(fit::Fit& fit, const Run& run, const FitRecord& record) {
   if (run.writes_files() && run.processes.size() > 1)
     checkpoint::save_fit(run.paths.model, fit, info, state);
   RunResult result{.model = output::Model{info, fit.take_field(), std::nullopt},
-                   .metrics = run_json(run.options, std::move(found.metrics)),
-                   .verdict = std::move(found.verdict),
-                   .bead_masking = measured.masks.bead_masking};
+                   .record = run_record(run.options, std::move(found))};
   const ResultFiles files{run, origin, state, share, view};
   if (!run.options.field.budget.empty()) make_compact_or_keep(files, outputs, result);
   if (run.writes_files()) write_together(files, *outputs, result);

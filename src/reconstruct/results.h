@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
@@ -13,7 +12,7 @@
 #include "output/model_file.h"
 #include "output/volume.h"
 #include "reconstruct/run.h"
-#include "verdict/verdict.h"
+#include "record/run_record.h"
 
 namespace tomofield::reconstruction {
 
@@ -31,30 +30,22 @@ struct RunResult {
   /// The model; each process has the parameters of its own leaves. A run with halves has none: its
   /// models are in files.
   std::optional<output::Model> model = {};
-  nlohmann::json metrics = {};  ///< the content of the JSON file beside the volume
-  verdict::Verdict verdict = {};
-  tilt_series::BeadMasking bead_masking = tilt_series::BeadMasking::kNone;
+  record::RunRecord record = {};  ///< the content of the JSON file beside the volume
   std::vector<std::filesystem::path> pictures = {};  ///< that were drawn
   std::filesystem::path checkpoint = {};             ///< of a run that was stopped during the fit
-};
-
-/// The findings of an examination of a finished fit.
-struct Examination {
-  nlohmann::json metrics;
-  verdict::Verdict verdict;
-  std::optional<measurement::ViewErrors> held_out;
+  Options options = {};  ///< as they were used, with what trials have chosen
 };
 
 /// Examines a finished fit to `measured`. Every process calls it.
-Examination examine(const fit::Fit& fit, const measurement::Measurement& measured, const Run& run,
-                    const FitRecord& record);
+record::FitRecord examine(const fit::Fit& fit, const measurement::Measurement& measured,
+                          const Run& run, const FitOutcome& outcome);
 
 /// Predicts the held-out view nearest to zero tilt, if views are held out.
 std::optional<measurement::PredictedView> central_held_out_view(
-    const fit::Fit& fit, const measurement::Measurement& measured, const Examination& found);
+    const fit::Fit& fit, const measurement::Measurement& measured, const record::FitRecord& found);
 
-/// Returns the content of the JSON file of a run.
-nlohmann::json run_json(const options::ReconstructOptions& options, nlohmann::json metrics);
+/// Returns the record of a run whose fit of all data was examined.
+record::RunRecord run_record(const options::ReconstructOptions& options, record::FitRecord fit);
 
 /// What the files of a fit are written from, beside the result.
 struct ResultFiles {
@@ -73,6 +64,6 @@ void write_together(const ResultFiles& files, io::OutputSet& outputs, RunResult&
 /// Takes the result out of a finished fit to all views, which loses its field. If the run writes
 /// files, it writes them (write_together()); the model is the checkpoint of the finished fit. Every
 /// process calls it.
-RunResult finish(fit::Fit& fit, const Run& run, const FitRecord& record);
+RunResult finish(fit::Fit& fit, const Run& run, const FitOutcome& outcome);
 
 }  // namespace tomofield::reconstruction

@@ -41,7 +41,7 @@ struct Run {
 };
 
 /// What is kept of a fit beside its field.
-struct FitRecord {
+struct FitOutcome {
   checkpoint::FitOrigin origin;
   double seconds = 0.0;  ///< of its steps
 };

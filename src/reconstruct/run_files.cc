@@ -35,6 +35,19 @@ bool can_resume(const options::ReconstructOptions& options, const output::Output
                                 (options.may_use_tiles() && has(paths.tiles)));
 }
 
+// Says what a user can do about results that are there already.
+std::string advice_on_old_files(const options::ReconstructOptions& options,
+                                const output::OutputPaths& paths) {
+  if (options.run.resume)
+    return "there is no checkpoint to resume, so give --overwrite to start over and replace it, or "
+           "another name with -o";
+  options::ReconstructOptions resumed = options;
+  resumed.run.resume = true;
+  return fmt::format(
+      "give --overwrite to replace it, {}or another name with -o",
+      can_resume(resumed, paths) ? "--resume to continue the run that made it, " : "");
+}
+
 // Returns the files that the run writes.
 std::vector<std::filesystem::path> files_of(const options::ReconstructOptions& options,
                                             const output::OutputPaths& paths) {
@@ -74,12 +87,7 @@ void check_options(const options::ReconstructOptions& options) {
   io::require_volume_name(options.run.output);
   const output::OutputPaths paths = output::output_paths(options.run.output);
   const bool may_replace = options.run.overwrite || can_resume(options, paths);
-  const char* const advice =
-      options.run.resume
-          ? "there is no checkpoint to resume, so give --overwrite to start over and "
-            "replace it, or another name with -o"
-          : "give --overwrite to replace it, --resume to continue the run that made "
-            "it, or another name with -o";
+  const std::string advice = advice_on_old_files(options, paths);
   io::check_output_files(files_of(options, paths), io::input_files(options.files), may_replace,
                          advice);
   if (options.volume.zarr) output::check_zarr(paths.volume, may_replace, advice);

@@ -21,10 +21,9 @@ std::optional<fs::path> if_there(const fs::path& file, bool is_expected) {
 void write_report(const Run& run, const io::OutputSet& outputs, const RunResult& result,
                   const report::ReportPictures& pictures) {
   io::write_text_file(run.paths.report,
-                      report::run_report({.record = result.metrics,
+                      report::run_report({.record = result.record,
                                           .files = run.options.files,
                                           .options = run.options,
-                                          .alignment = run.options.alignment,
                                           .volume = outputs.location_of(run.paths.volume),
                                           .pictures = pictures}));
 }
@@ -34,7 +33,7 @@ void write_report(const Run& run, const io::OutputSet& outputs, const RunResult&
 void write_pages(const Run& run, const io::OutputSet& outputs, RunResult& result) {
   const output::OutputPaths& paths = run.paths;
   const fs::path volume = outputs.location_of(paths.volume);
-  report::write_run_pictures(volume, run.series, result.bead_masking, paths);
+  report::write_run_pictures(volume, run.series, run.measurement.masks.bead_masking, paths);
   result.pictures = paths.pictures();
   exchange::write_exchange_files(run.series, run.options, volume);
   // Trials draw theirs before the fit.

@@ -21,7 +21,6 @@
 #include "options/run_options.h"
 #include "reconstruct/run_fit.h"
 #include "tomofield/error.h"
-#include "verdict/verdict_record.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -37,14 +36,14 @@ struct CoarseStart {
 
 // Holds what is kept of the fit of a tile near the middle, which speaks for all of them.
 struct Example {
-  Examination found;
+  record::FitRecord found;
   std::optional<measurement::PredictedView> held_out_view;
   plan::Tile tile;
 };
 
 // Fits the coarse stages of the whole region. Returns nothing if the run was stopped.
 std::optional<CoarseStart> fit_coarse_stages(const Run& run, const plan::TilePlan& plan,
-                                             const FitRecord& record) {
+                                             const FitOutcome& outcome) {
   const auto stages = fit::make_stages(run.options.field, run.options.fit);
   double work = 0, of_coarse = 0;
   for (const fit::Stage& stage : stages) {
@@ -55,7 +54,7 @@ std::optional<CoarseStart> fit_coarse_stages(const Run& run, const plan::TilePla
       base::part_of(run.observer.fit, 0.0, of_coarse / work, "whole region");
   const FitJob job{.measurement = run.measurement,
                    .model = run.paths.model,
-                   .origin = record.origin,
+                   .origin = outcome.origin,
                    .resumes = run.options.run.resume,
                    .progress = progress,
                    .part = {.num_stages = plan.num_whole_stages}};
@@ -64,7 +63,7 @@ std::optional<CoarseStart> fit_coarse_stages(const Run& run, const plan::TilePla
   if (made.took_steps && run.writes_files())
     checkpoint::save_checkpoint(run.paths.model, *made.fit,
                                 checkpoint::model_info(run.measurement, run.options),
-                                record.origin);
+                                outcome.origin);
   const double variance = compact::variance_of(made.fit->field(), run.measurement.roi);
   return CoarseStart{.progress = made.fit->progress(),
                      .field = made.fit->take_field(),
@@ -76,9 +75,9 @@ std::optional<CoarseStart> fit_coarse_stages(const Run& run, const plan::TilePla
 // Fits one tile after the other.
 class TileFits {
  public:
-  TileFits(const Run& run, const FitRecord& record, const CoarseStart& start, int num_rows,
+  TileFits(const Run& run, const FitOutcome& outcome, const CoarseStart& start, int num_rows,
            checkpoint::FinishedTiles& finished)
-      : run_(run), record_(record), start_(start), num_rows_(num_rows), finished_(finished) {
+      : run_(run), outcome_(outcome), start_(start), num_rows_(num_rows), finished_(finished) {
     fit_options_.fit_view_scale = false;  // the coarse stages have found scales for all tiles
   }
 
@@ -101,7 +100,7 @@ class TileFits {
     if (!rays.held_out.empty())
       done.held_out_error = fit->held_out_error(run_.options.fit.fit_view_scale).total;
     if (example != nullptr) {
-      Examination found = examine(*fit, rays, run_, record_);
+      record::FitRecord found = examine(*fit, rays, run_, outcome_);
       auto view = central_held_out_view(*fit, rays, found);
       example->emplace(Example{std::move(found), std::move(view), tile});
     }
@@ -160,7 +159,7 @@ class TileFits {
   }
 
   const Run& run_;
-  const FitRecord& record_;
+  const FitOutcome& outcome_;
   const CoarseStart& start_;
   int num_rows_;
   checkpoint::FinishedTiles& finished_;
@@ -175,38 +174,34 @@ std::size_t middle_tile(const std::vector<plan::Tile>& tiles, int num_rows) {
   return static_cast<std::size_t>(std::ranges::min_element(tiles, {}, distance) - tiles.begin());
 }
 
-// Returns the metrics of the run: those of the example where they are of one fit, and those of all
-// tiles.
-nlohmann::json metrics_of(const Run& run, const Example& example,
-                          const checkpoint::FinishedTiles& finished,
-                          const verdict::Verdict& verdict, double seconds) {
-  nlohmann::json metrics = example.found.metrics;
-  const measurement::Measurement& series = run.measurement;
-  metrics["size_px"] = {series.roi.width(), series.roi.height(), series.geometry.thickness};
-  metrics["seconds"] = seconds;
-  metrics["leaves"] = finished.coded().tree.num_leaves();
-  metrics["verdict"] = verdict::verdict_json(verdict);
-  metrics["example_tile"] = {example.tile.own.begin, example.tile.own.end};
-  metrics["tiles"] = checkpoint::to_json(finished.tiles());
-  metrics["compact"] = output::compact_json(
-      finished.report(), finished.sum_of(&checkpoint::FinishedTile::seconds_compressing));
-  return metrics;
+// Returns the record of the run: that of the example where it is of one fit, and that of all tiles.
+record::RunRecord record_of_tiles(const Run& run, const Example& example,
+                                  const checkpoint::FinishedTiles& finished, double seconds) {
+  using checkpoint::FinishedTile;
+  record::RunRecord record = run_record(run.options, example.found);
+  record::FitMetrics& metrics = record.fit.metrics;
+  metrics.width = run.measurement.roi.width();
+  metrics.height = run.measurement.roi.height();
+  metrics.thickness = run.measurement.geometry.thickness;
+  metrics.seconds = seconds;
+  metrics.num_leaves = finished.coded().tree.num_leaves();
+  verdict::Verdict& verdict = record.fit.verdict;
+  verdict.residual = finished.mean_of(&FinishedTile::residual);
+  verdict.seconds = run.options.since_start.seconds();
+  verdict.peak_GiB = static_cast<double>(base::peak_memory()) / (1 << 30);
+  record.tiles = record::TilesRecord{example.tile.own, finished.tiles()};
+  record.compact =
+      record::CompactRecord{finished.report(), finished.sum_of(&FinishedTile::seconds_compressing)};
+  return record;
 }
 
 // Writes the results of a run whose tiles are all finished.
-RunResult finish_tiles(const Run& run, FitRecord& record, checkpoint::FinishedTiles& finished,
+RunResult finish_tiles(const Run& run, FitOutcome& outcome, checkpoint::FinishedTiles& finished,
                        Example example, double seconds_of_coarse) {
-  record.seconds = seconds_of_coarse + finished.sum_of(&checkpoint::FinishedTile::seconds_fitting);
-  verdict::Verdict& verdict = example.found.verdict;
-  verdict.residual = finished.mean_of(&checkpoint::FinishedTile::residual);
-  verdict.seconds = run.options.since_start.seconds();
-  verdict.peak_GiB = static_cast<double>(base::peak_memory()) / (1 << 30);
-  RunResult result{
-      .model = output::Model{checkpoint::model_info(run.measurement, run.options), nullptr,
-                             std::nullopt},
-      .metrics = run_json(run.options, metrics_of(run, example, finished, verdict, record.seconds)),
-      .verdict = std::move(verdict),
-      .bead_masking = run.measurement.masks.bead_masking};
+  outcome.seconds = seconds_of_coarse + finished.sum_of(&checkpoint::FinishedTile::seconds_fitting);
+  RunResult result{.model = output::Model{checkpoint::model_info(run.measurement, run.options),
+                                          nullptr, std::nullopt},
+                   .record = record_of_tiles(run, example, finished, outcome.seconds)};
   result.model->coded = finished.take();
   if (!run.writes_files()) {
     result.model->field = compact::decode_field(*result.model->coded);
@@ -216,32 +211,33 @@ RunResult finish_tiles(const Run& run, FitRecord& record, checkpoint::FinishedTi
   const output::TrainingState no_state;
   const output::VolumeShare share{
       run.processes, {0, static_cast<int>(run.measurement.roi.height())}, 0, 0};
-  write_together({run, record.origin, no_state, share, example.held_out_view}, outputs, result);
+  write_together({run, outcome.origin, no_state, share, example.held_out_view}, outputs, result);
   finished.remove_file();
   return result;
 }
 
 }  // namespace
 
-RunResult fit_by_tiles(const Run& run, const plan::TilePlan& plan, FitRecord& record) {
+RunResult fit_by_tiles(const Run& run, const plan::TilePlan& plan, FitOutcome& outcome) {
   const base::TraceSpan span("fit by tiles");
   const auto stopped = [&] {
     return RunResult{.outcome = Outcome::kStopped, .checkpoint = run.paths.model};
   };
   checkpoint::FinishedTiles finished(
-      run.options, run.measurement, record.origin);  // refuses tiles of another run before any work
-  const std::optional<CoarseStart> start = fit_coarse_stages(run, plan, record);
+      run.options, run.measurement,
+      outcome.origin);  // refuses tiles of another run before any work
+  const std::optional<CoarseStart> start = fit_coarse_stages(run, plan, outcome);
   if (!start) return stopped();
   const std::vector<plan::Tile> tiles = plan.tiles_from(finished.num_rows());
   const std::size_t middle = middle_tile(tiles, plan.num_rows);
-  TileFits fits(run, record, *start, plan.num_rows, finished);
+  TileFits fits(run, outcome, *start, plan.num_rows, finished);
   std::optional<Example> example;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (!fits.fit(tiles[i], i == middle ? &example : nullptr)) return stopped();
     // A run that resumes has at least one tile to fit, which speaks for all.
     if (i + 1 < tiles.size()) finished.save();
   }
-  return finish_tiles(run, record, finished, std::move(*example), start->seconds);
+  return finish_tiles(run, outcome, finished, std::move(*example), start->seconds);
 }
 
 }  // namespace tomofield::reconstruction

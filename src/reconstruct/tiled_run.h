@@ -14,6 +14,6 @@ namespace tomofield::reconstruction {
 ///
 /// A stopped run goes on with --resume after the coarse stages' last checkpoint, or after the last
 /// tile that was finished.
-RunResult fit_by_tiles(const Run& run, const plan::TilePlan& plan, FitRecord& record);
+RunResult fit_by_tiles(const Run& run, const plan::TilePlan& plan, FitOutcome& outcome);
 
 }  // namespace tomofield::reconstruction

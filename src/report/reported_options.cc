@@ -48,6 +48,14 @@ std::string place_of(const Setting& setting) {
                                : setting.file.string() + ": " + setting.entry;
 }
 
+// Says where the value of an option comes from that a file sets, and what does not hold.
+std::string origin_of(const Setting& setting, const std::string& origin) {
+  if (setting.instead.empty()) return place_of(setting);
+  const bool is_same_option = setting.instead.starts_with(setting.option + " ");
+  return fmt::format("{}, in place of {} ({})", is_same_option ? origin : setting.instead,
+                     setting.value, place_of(setting));
+}
+
 const char* text_of(Origin origin) {
   switch (origin) {
     case Origin::kDefault:
@@ -110,14 +118,14 @@ std::vector<ReportedOption> reported_options(const SeriesFiles& files, const Opt
     reported_ones.push_back(joined(parts, rows.front().unit));
     const auto setting = std::ranges::find(settings, long_flag(rows.front()), &Setting::option);
     if (setting == settings.end()) continue;
-    reported_ones.back().origin = place_of(*setting);
+    reported_ones.back().origin = origin_of(*setting, reported_ones.back().origin);
     reported_ones.back().is_default = false;
     settings.erase(setting);
   }
   for (const Setting& setting : settings)
     reported_ones.push_back({.flag = setting.option,
                              .value = setting.value,
-                             .origin = place_of(setting),
+                             .origin = origin_of(setting, ""),
                              .meaning = ""});
   return reported_ones;
 }

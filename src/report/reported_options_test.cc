@@ -70,6 +70,13 @@ TEST(ReportedOptions, NameTheFileAndItsEntry) {
   EXPECT_EQ(option_of(options, "--thickness").origin, "tilt.com: THICKNESS");
   EXPECT_EQ(option_of(options, "--contrast").origin, "series.mdoc");
   EXPECT_FALSE(option_of(options, "--contrast").is_default);
+  requested.specimen.thickness = 200;
+  requested.settings[1].instead = "--other 2";
+  const auto replaced = reported(requested);
+  EXPECT_EQ(option_of(replaced, "--thickness").value, "200 unbinned pixels");
+  EXPECT_EQ(option_of(replaced, "--thickness").origin,
+            "given, in place of 150 (tilt.com: THICKNESS)");
+  EXPECT_EQ(option_of(replaced, "--contrast").origin, "--other 2, in place of dark (series.mdoc)");
   EXPECT_EQ(options.back().flag, "--other");
   EXPECT_EQ(options.back().value, "1.5");
 }

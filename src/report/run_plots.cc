@@ -8,16 +8,12 @@
 #include <utility>
 
 #include "base/statistics.h"
-#include "io/json.h"
 #include "report/choice_plot.h"
 #include "report/curve_plot.h"
 #include "report/pictures.h"
-#include "tune/trial_record.h"
 
 namespace tomofield::report {
 namespace {
-
-using nlohmann::json;
 
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();  // is not drawn
 constexpr const char* kTilt = "tilt, degrees";
@@ -34,34 +30,33 @@ std::string plot(const PlotAxes& axes, std::vector<Curve> curves) {
   return curves.empty() ? "" : curve_plot_svg(axes, curves);
 }
 
-// Returns a member of an object, or null if it is not there.
-const json& member(const json& object, const char* key) {
-  static const json kNull;
-  const auto found = object.is_object() ? object.find(key) : object.end();
-  return found == object.end() ? kNull : *found;
-}
-
-std::string name_of(const char* curve, const FitMetrics& fit) {
+std::string name_of(const char* curve, const NamedFit& fit) {
   return fit.name.empty() ? curve : fmt::format("{}, {}", curve, fit.name);
 }
 
-// Returns a curve of an array of numbers, one an epoch.
-Curve epoch_curve(std::string name, const json& values) {
+// Returns a curve of numbers, one an epoch.
+Curve epoch_curve(std::string name, const std::vector<double>& values) {
   Curve curve{std::move(name), {}};
-  for (const json& value : values)
-    curve.points.emplace_back(static_cast<double>(curve.points.size() + 1),
-                              log10_of(io::number_or_nan(value)));
+  for (const double value : values)
+    curve.points.emplace_back(static_cast<double>(curve.points.size() + 1), log10_of(value));
   return curve;
 }
 
-// Returns a number of each view over its tilt, in order of tilt.
-Curve tilt_curve(std::string name, const json& views, const char* key, double unit = 1.0) {
+// Returns value_of(view) of each view over its tilt, in order of tilt.
+template <typename ValueOf>
+Curve tilt_curve(std::string name, const record::FitMetrics& metrics, const ValueOf& value_of) {
   Curve curve{std::move(name), {}};
-  for (const json& view : views)
-    curve.points.emplace_back(io::number_or_nan(member(view, "tilt_deg")),
-                              io::number_or_nan(member(view, key)) / unit);
+  for (std::size_t view = 0; view < metrics.views.size(); ++view)
+    curve.points.emplace_back(metrics.views[view].tilt_deg, value_of(view));
   std::ranges::sort(curve.points);
   return curve;
+}
+
+// Returns a number of each view over its tilt.
+Curve tilt_curve(std::string name, const record::FitMetrics& metrics,
+                 double record::ViewMetrics::*number) {
+  return tilt_curve(std::move(name), metrics,
+                    [&](std::size_t view) { return metrics.views[view].*number; });
 }
 
 // Gives the points of a curve marks.
@@ -75,11 +70,10 @@ Curve with_marks(Curve curve) {
 
 std::string loss_plot(const AllFits& fits) {
   std::vector<Curve> curves;
-  for (const FitMetrics& fit : fits) {
-    curves.push_back(epoch_curve(name_of("fitted views", fit),
-                                 member(fit.metrics, "mean_squared_residual_per_noise_variance")));
-    curves.push_back(epoch_curve(name_of("held-out views", fit),
-                                 member(member(fit.metrics, "held_out"), "error_by_epoch")));
+  for (const NamedFit& fit : fits) {
+    curves.push_back(epoch_curve(name_of("fitted views", fit), fit.metrics().data_loss));
+    if (const auto& held_out = fit.metrics().held_out)
+      curves.push_back(epoch_curve(name_of("held-out views", fit), held_out->error_by_epoch));
   }
   const auto range = range_with_room(curves, 0.02);
   if (!std::isfinite(range.first)) return "";
@@ -90,21 +84,27 @@ std::string loss_plot(const AllFits& fits) {
               curves);
 }
 
-std::string trials_plot(const json& metrics) {
-  const json& tuning = member(metrics, "tuning");
-  if (!tuning.is_object()) return "";
-  const CurvePlot choice = choice_plot(tune::tuned_from(tuning));
+std::string trials_plot(const std::optional<tune::TunedFit>& tuned) {
+  if (!tuned) return "";
+  const CurvePlot choice = choice_plot(*tuned);
   return curve_plot_svg(choice.axes, choice.curves);
 }
 
 std::string residual_plot(const AllFits& fits) {
   std::vector<Curve> curves;
-  for (const FitMetrics& fit : fits) {
-    curves.push_back(
-        tilt_curve(name_of("fitted views", fit), member(fit.metrics, "views"), "residual"));
-    curves.push_back(
-        with_marks(tilt_curve(name_of("held-out views", fit),
-                              member(member(fit.metrics, "held_out"), "views"), "error")));
+  for (const NamedFit& fit : fits) {
+    const record::FitMetrics& metrics = fit.metrics();
+    curves.push_back(tilt_curve(name_of("fitted views", fit), metrics, [&](std::size_t view) {
+      return metrics.views[view].residual.value_or(kNothing);
+    }));
+    if (!metrics.held_out) continue;
+    const measurement::ViewErrors& errors = metrics.held_out->errors;
+    Curve held_out{name_of("held-out views", fit), {}};
+    for (std::size_t i = 0; i < errors.views.size(); ++i)
+      held_out.points.emplace_back(
+          metrics.views[static_cast<std::size_t>(errors.views[i])].tilt_deg, errors.view_error[i]);
+    std::ranges::sort(held_out.points);
+    curves.push_back(with_marks(std::move(held_out)));
   }
   const auto [low, high] = range_with_room(curves, 0.05);
   return plot({.x_title = kTilt,
@@ -115,10 +115,10 @@ std::string residual_plot(const AllFits& fits) {
 
 std::string scale_plot(const AllFits& fits) {
   std::vector<Curve> curves;
-  for (const FitMetrics& fit : fits) {
-    const json& views = member(fit.metrics, "views");
-    curves.push_back(tilt_curve(name_of("scale", fit), views, "scale"));
-    curves.push_back(tilt_curve(name_of("weight in the fit", fit), views, "weight"));
+  for (const NamedFit& fit : fits) {
+    curves.push_back(tilt_curve(name_of("scale", fit), fit.metrics(), &record::ViewMetrics::scale));
+    curves.push_back(
+        tilt_curve(name_of("weight in the fit", fit), fit.metrics(), &record::ViewMetrics::weight));
   }
   return plot({.x_title = kTilt, .y_title = "factor", .y_range = range_with_room(curves, 0.02)},
               curves);
@@ -126,10 +126,11 @@ std::string scale_plot(const AllFits& fits) {
 
 std::string offset_plot(const AllFits& fits) {
   std::vector<Curve> curves;
-  for (const FitMetrics& fit : fits) {
-    const json& views = member(fit.metrics, "views");
-    curves.push_back(tilt_curve(name_of("offset", fit), views, "offset"));
-    curves.push_back(tilt_curve(name_of("noise (standard deviation)", fit), views, "noise_sigma"));
+  for (const NamedFit& fit : fits) {
+    curves.push_back(
+        tilt_curve(name_of("offset", fit), fit.metrics(), &record::ViewMetrics::offset));
+    curves.push_back(tilt_curve(name_of("noise (standard deviation)", fit), fit.metrics(),
+                                &record::ViewMetrics::noise_sigma));
   }
   return plot({.x_title = kTilt,
                .y_title = "line integral, units of the views",
@@ -139,16 +140,16 @@ std::string offset_plot(const AllFits& fits) {
 
 std::string displacement_plot(const AllFits& fits) {
   std::vector<Curve> curves;
-  for (const FitMetrics& fit : fits) {
-    const json& compared = member(member(member(fit.metrics, "verdict"), "views"), "compared");
+  for (const NamedFit& fit : fits) {
+    const std::optional<verdict::ViewAgreement>& compared = fit.fit.verdict.views;
+    if (!compared) continue;
     const char* const names[] = {"across the tilt axis (x)", "along the tilt axis (y)"};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       Curve curve{name_of(names[axis], fit), {}};
-      for (const json& view : compared)
+      for (std::size_t i = 0; i < compared->views.size(); ++i)
         curve.points.emplace_back(
-            io::number_or_nan(
-                fit.metrics.at("views").at(view.at("view").get<std::size_t>()).at("tilt_deg")),
-            io::number_or_nan(view.at("displacement_px").at(axis)));
+            fit.metrics().views[static_cast<std::size_t>(compared->views[i])].tilt_deg,
+            compared->displacement_px[i][axis]);
       curves.push_back(with_marks(std::move(curve)));
     }
   }
@@ -161,11 +162,11 @@ std::string displacement_plot(const AllFits& fits) {
 
 std::string masked_plot(const AllFits& fits) {
   std::vector<Curve> curves;
-  for (const FitMetrics& fit : fits) {
-    const json& mask = member(fit.metrics, "mask");
-    if (io::number_or_nan(member(mask, "masked_part")) > 0)
-      curves.push_back(
-          tilt_curve(name_of("masked pixels", fit), member(mask, "views"), "masked_part", 0.01));
+  for (const NamedFit& fit : fits) {
+    const output::MaskedViews& mask = fit.metrics().mask;
+    if (!(mask.mean_part() > 0)) continue;
+    curves.push_back(tilt_curve(name_of("masked pixels", fit), fit.metrics(),
+                                [&](std::size_t view) { return mask.part[view] / 0.01; }));
   }
   return plot({.x_title = kTilt,
                .y_title = "per cent of the view",
@@ -173,24 +174,15 @@ std::string masked_plot(const AllFits& fits) {
               curves);
 }
 
-std::string halves_plot(const json& fsc) {
-  if (!fsc.is_object() || !fsc.contains("frequency_per_A")) return "";
-  std::vector<double> frequencies;
-  for (const json& frequency : fsc["frequency_per_A"])
-    frequencies.push_back(io::number_or_nan(frequency));
-  if (frequencies.empty()) return "";
-  std::vector<Curve> curves;
-  const std::pair<const char*, const char*> kinds[] = {
-      {"all", "both halves"}, {"measured", "measured directions"}, {"missing", "missing wedge"}};
-  for (const auto& [key, name] : kinds) {
-    if (!fsc.contains(key)) continue;
-    std::vector<double> correlation;
-    for (const json& value : fsc[key].at("correlation"))
-      correlation.push_back(io::number_or_nan(value));
-    correlation.resize(frequencies.size(), kNothing);
-    curves.push_back(fsc_curve(name, frequencies, correlation));
-  }
-  return plot(fsc_axes(frequencies.back()), curves);
+std::string halves_plot(const evaluate::Fsc& fsc) {
+  if (fsc.frequency_per_A.empty()) return "";
+  std::vector<Curve> curves{fsc_curve("both halves", fsc.frequency_per_A, fsc.all.correlation)};
+  if (fsc.measured)
+    curves.push_back(
+        fsc_curve("measured directions", fsc.frequency_per_A, fsc.measured->correlation));
+  if (fsc.missing)
+    curves.push_back(fsc_curve("missing wedge", fsc.frequency_per_A, fsc.missing->correlation));
+  return plot(fsc_axes(fsc.frequency_per_A.back()), curves);
 }
 
 std::string histogram_plot(const std::vector<float>& voxels) {

@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 #include <vector>
 
 #include "base/trace.h"
 #include "base/version.h"
 #include "io/images/mrc.h"
-#include "io/json.h"
+#include "measurement/view_transfers.h"
 #include "report/alignment_plot.h"
 #include "report/embedded_volume.h"
 #include "report/html.h"
@@ -20,11 +19,10 @@
 #include "report/reported_options.h"
 #include "report/run_plots.h"
 #include "tomofield/version.h"
+#include "verdict/verdict.h"
 
 namespace tomofield::report {
 namespace {
-
-using nlohmann::json;
 
 std::string size_text(const std::array<std::int64_t, 3>& size) {
   return fmt::format("{} × {} × {}", size[0], size[1], size[2]);
@@ -36,43 +34,25 @@ std::string time_text(double seconds) {
   return fmt::format("{:.1f} h", seconds / 3600);
 }
 
-// Returns the metrics of each fit: of all data, and of the halves, if the run made some.
-AllFits fits_of(const json& record) {
-  for (const json* object : {&record, &record.at("metrics")}) {
-    const auto halves = object->find("halves");
-    if (halves == object->end() || !halves->contains("even") || !halves->contains("odd")) continue;
-    return {{"all data", record.at("metrics")},
-            {"even half", halves->at("even").at("metrics")},
-            {"odd half", halves->at("odd").at("metrics")}};
-  }
-  return {{"", record.at("metrics")}};
+// Returns each fit: that of all data, and those of the halves, if the run made some.
+AllFits fits_of(const record::RunRecord& record) {
+  if (!record.halves) return {{"", record.fit}};
+  const auto& [even, odd] = record.halves->halves;
+  return {{"all data", record.fit}, {"even half", even.fit}, {"odd half", odd.fit}};
 }
 
-// Returns the lowest and the highest tilt.
-std::pair<double, double> tilt_range(const json& metrics) {
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (const json& view : metrics.at("views")) {
-    low = std::min(low, io::number_or_nan(view.at("tilt_deg")));
-    high = std::max(high, io::number_or_nan(view.at("tilt_deg")));
-  }
-  return {low, high};
-}
-
-void add_verdict(const json& verdict, HtmlPage& page) {
-  const json& warnings = verdict.at("warnings");
+void add_verdict(const verdict::Verdict& verdict, HtmlPage& page) {
   std::vector<std::string> texts;
-  for (const json& warning : warnings) {
-    std::string text = warning.at("message");
+  for (const verdict::Warning& warning : verdict.warnings) {
+    std::string text = warning.message;
     if (!text.empty()) text.front() = static_cast<char>(std::toupper(text.front()));
     texts.push_back(text + ".");
   }
   if (texts.empty()) {
     const char* const checked =
-        verdict.at("views").is_object()
-            ? "Contrast, order of the tilts, alignment, tilt axis, thickness, noise and residual "
-              "were "
-              "checked"
-            : "The thickness was checked, which is all that --engine ray allows";
+        verdict.views ? "Contrast, order of the tilts, alignment, tilt axis, thickness, noise and "
+                        "residual were checked"
+                      : "The thickness was checked, which is all that --engine ray allows";
     page.add_notice("No warning",
                     {fmt::format("{}, and nothing seems off. No check can see a wrong hand, or a "
                                  "thickness that is a little too small.",
@@ -84,9 +64,10 @@ void add_verdict(const json& verdict, HtmlPage& page) {
                   texts, true);
 }
 
-std::vector<HtmlFact> facts_of_size(const AllFits& fits, const EmbeddedVolume& volume) {
-  const json& metrics = fits.front().metrics;
-  const auto [low, high] = tilt_range(metrics);
+std::vector<HtmlFact> facts_of_size(const record::FitMetrics& metrics,
+                                    const EmbeddedVolume& volume) {
+  const auto [lowest, highest] =
+      std::ranges::minmax(metrics.views, {}, &record::ViewMetrics::tilt_deg);
   const auto& size = volume.file_size;
   std::vector<HtmlFact> facts{
       {"Tomogram", size_text(size), "Voxels along x, y and z of the file."}};
@@ -98,8 +79,9 @@ std::vector<HtmlFact> facts_of_size(const AllFits& fits, const EmbeddedVolume& v
         {"Voxel", fmt::format("{:.4g} Å", volume.voxel_size_A),
          fmt::format("The tomogram has {:.4g} × {:.4g} × {:.4g} nm.", nm(0), nm(1), nm(2))});
   }
-  facts.push_back({"Views", fmt::format("{}", metrics.at("views").size()),
-                   fmt::format("Tilts from {:.1f}° to {:.1f}°.", low, high)});
+  facts.push_back(
+      {"Views", fmt::format("{}", metrics.views.size()),
+       fmt::format("Tilts from {:.1f}° to {:.1f}°.", lowest.tilt_deg, highest.tilt_deg)});
   return facts;
 }
 
@@ -133,65 +115,57 @@ void add_pose(const alignment::AlignmentRecord& alignment, std::vector<HtmlFact>
        "alignment applied none of them; --thickness and tomofield export --level found do that."});
 }
 
-void add_prior(const json& prior, std::vector<HtmlFact>& facts) {
-  const bool is_used = prior.at("learned").get<bool>();
-  const double gain = io::number_or_nan(prior.at("gain"));
-  if (!is_used && !std::isfinite(gain)) return;
+void add_prior(const verdict::PriorSummary& prior, std::vector<HtmlFact>& facts) {
+  if (!prior.is_used && !prior.gain) return;
   std::string note =
       "A network that was trained on simulated series suggested what is shown, and the views "
       "corrected it. ";
-  if (!is_used) note = "A trial with the learned prior predicted held-out views worse. ";
-  if (std::isfinite(gain))
+  if (!prior.is_used) note = "A trial with the learned prior predicted held-out views worse. ";
+  if (prior.gain)
     note += fmt::format("Error of held-out views with it, in trials: {:+.2f} % ± {:.2f}.",
-                        -100 * gain, 100 * io::number_or_nan(prior.at("standard_error")));
-  facts.push_back({"Learned prior", is_used ? "yes" : "no", note});
+                        -100 * prior.gain->log_ratio, 100 * prior.gain->standard_error);
+  facts.push_back({"Learned prior", prior.is_used ? "yes" : "no", note});
 }
 
-std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics,
-                                   const std::optional<alignment::AlignmentRecord>& alignment) {
+void add_held_out(const verdict::HeldOutSummary& held_out, std::vector<HtmlFact>& facts) {
+  facts.push_back(
+      {held_out.is_of_trials ? "Held-out views, in trials" : "Held-out views",
+       fmt::format("{:.2f}", held_out.median),
+       fmt::format("The same of views that were not fitted (median): near the residual if the "
+                   "tomogram has no structure that only the fitted views want. Worst {:.2f} at "
+                   "{:.1f}°.",
+                   held_out.worst, held_out.worst_tilt_deg)});
+}
+
+std::vector<HtmlFact> facts_of_fit(const record::FitRecord& fit) {
+  const verdict::Verdict& verdict = fit.verdict;
   std::vector<HtmlFact> facts;
-  facts.push_back({"Residual", fmt::format("{:.2f}", io::number_or_nan(verdict.at("residual"))),
+  facts.push_back({"Residual", fmt::format("{:.2f}", verdict.residual),
                    "What the tomogram leaves of the views, over the noise's variance: about 1 if "
                    "nothing but noise is left, more if it cannot explain the views."});
-  if (const json& held_out = verdict.at("held_out"); held_out.is_object()) {
-    facts.push_back(
-        {held_out.at("of_trials").get<bool>() ? "Held-out views, in trials" : "Held-out views",
-         fmt::format("{:.2f}", io::number_or_nan(held_out.at("median"))),
-         fmt::format("The same of views that were not fitted (median): near the residual if the "
-                     "tomogram has no structure that only the fitted views want. Worst {:.2f} at "
-                     "{:.1f}°.",
-                     io::number_or_nan(held_out.at("worst")),
-                     io::number_or_nan(held_out.at("worst_tilt_deg")))});
-  }
-  add_prior(verdict.at("prior"), facts);
-  if (const json& views = verdict.at("views"); views.is_object()) {
-    facts.push_back({"Alignment",
-                     fmt::format("{:.2g} px", io::number_or_nan(views.at("usual_displacement_px"))),
+  if (verdict.held_out) add_held_out(*verdict.held_out, facts);
+  add_prior(verdict.prior, facts);
+  if (verdict.views)
+    facts.push_back({"Alignment", fmt::format("{:.2g} px", verdict.views->usual_displacement_px()),
                      "9 of 10 views lie closer than this to where the tomogram predicts them."});
+  if (fit.alignment) {
+    add_beads(*fit.alignment, facts);
+    add_pose(*fit.alignment, facts);
   }
-  if (alignment) {
-    add_beads(*alignment, facts);
-    add_pose(*alignment, facts);
-  }
-  if (const double speckle = io::number_or_nan(verdict.value("speckle", json()));
-      std::isfinite(speckle))
+  if (const auto& speckle = verdict.artefacts.speckle; speckle && std::isfinite(*speckle))
     facts.push_back(
-        {"Speckle", fmt::format("{:.3f} %", 100 * speckle),
+        {"Speckle", fmt::format("{:.3f} %", 100 * *speckle),
          "Voxels that stick out from all their neighbours. Hardly anybody sees less than "
          "0.02 %."});
-  facts.push_back(
-      {"Masked",
-       fmt::format("{:.1f} %", 100 * io::number_or_nan(metrics.at("mask").at("masked_part"))),
-       "Pixels of the views that did not count: beads, fill, bad pixels."});
-  facts.push_back(
-      {"Time and memory",
-       fmt::format("{}, {:.2g} GiB", time_text(io::number_or_nan(verdict.at("seconds"))),
-                   io::number_or_nan(verdict.at("peak_GiB"))),
-       fmt::format("Threads: {}.", metrics.at("threads").get<int>())});
+  facts.push_back({"Masked", fmt::format("{:.1f} %", 100 * fit.metrics.mask.mean_part()),
+                   "Pixels of the views that did not count: beads, fill, bad pixels."});
+  facts.push_back({"Time and memory",
+                   fmt::format("{}, {:.2g} GiB", time_text(verdict.seconds), verdict.peak_GiB),
+                   fmt::format("Threads: {}.", fit.metrics.threads)});
   return facts;
 }
 
-void add_volume(const json& record, const EmbeddedVolume& volume, HtmlPage& page) {
+void add_volume(VolumeAxes axes, const EmbeddedVolume& volume, HtmlPage& page) {
   page.add_heading("The tomogram");
   page.add_paragraph(
       "Turn the wheel over a plane to scroll through it (with Ctrl: to zoom), click to move the "
@@ -203,7 +177,7 @@ void add_volume(const json& record, const EmbeddedVolume& volume, HtmlPage& page
       size_text(volume.size),
       volume.size == volume.file_size ? "" : " (each the mean of the file's voxels that it covers)",
       volume.limits.first, volume.limits.second);
-  if (record.at("options").at("volume").at("axes") == "xzy")
+  if (axes == VolumeAxes::kXzy)
     text += " Planes are named after the axes of the file, whose y is the specimen's thickness.";
   page.add_paragraph(
       text + " The command tomofield view shows the file itself, and the model at any zoom.");
@@ -216,52 +190,61 @@ std::vector<HtmlCell> option_cells(const ReportedOption& option) {
           {option.meaning, ""}};
 }
 
+// Returns an option with the diameter of the beads that were masked, if nobody gave it.
+ReportedOption with_found_beads(ReportedOption option, const tilt_series::MaskMetrics& masks) {
+  const bool is_found = option.flag == "--bead-diameter" && option.is_default &&
+                        masks.bead_masking == tilt_series::BeadMasking::kMasked;
+  if (!is_found) return option;
+  option.value = fmt::format("{:.3g} nm", masks.bead_diameter_A / 10);
+  option.origin = "found in the views";
+  option.is_default = false;
+  return option;
+}
+
 // Says whether the views of a dark series were fitted without a contrast transfer.
-bool lacks_transfer(const nlohmann::json& input) {
-  const auto is_given = [&](const char* key) {
-    return input.contains(key) && !input[key].is_null() && input[key] != "" && input[key] != "none";
-  };
-  return input.at("contrast") == "dark" && !is_given("ctf") && !is_given("defocus_um");
+bool lacks_transfer(const SeriesFiles& files, const ViewOptions& views) {
+  return views.contrast == tomofield::Contrast::kDark && !measurement::has_ctf_file(files) &&
+         !views.defocus_um;
 }
 
 void add_input(const ReportSource& source, HtmlPage& page) {
   page.add_heading("What went in, and what was assumed");
-  if (lacks_transfer(source.record.at("options").at("input")))
+  if (lacks_transfer(source.files, source.options.views))
     page.add_paragraph(
         "CTF and dose: the views are taken as plain projections of the specimen, because no "
         "contrast transfer was given (--ctf or --defocus). So fringes of defocus stay in the "
         "tomogram. What was corrected in the stack before stays corrected.");
   using Rows = std::vector<std::vector<HtmlCell>>;
   Rows chosen{{{"option", ""}, {"value", ""}, {"from", ""}, {"meaning", ""}}}, defaults = chosen;
-  for (const ReportedOption& option : reported_options(source.files, source.options))
+  const tilt_series::MaskMetrics& masks = source.record.fit.metrics.mask.masks;
+  for (const ReportedOption& reported : reported_options(source.files, source.options)) {
+    const ReportedOption option = with_found_beads(reported, masks);
     (option.is_default ? defaults : chosen).push_back(option_cells(option));
+  }
   page.add_table(chosen, TableOf::kWords);
   page.begin_folded(fmt::format("{} options have their defaults", defaults.size() - 1));
   page.add_table(defaults, TableOf::kWords);
   page.end_folded();
 }
 
-std::string mask_text(const json& mask) {
-  const int beads = mask.at("beads").get<int>();
+std::string mask_text(const output::MaskedViews& masked) {
+  const tilt_series::MaskMetrics& masks = masked.masks;
   std::string text = "Pixels in red did not count in the fit. ";
-  if (beads == 0)
+  if (masks.num_beads == 0)
     text += "No beads were found";
-  else if (mask.at("bead_masking") == "masked")
-    text += fmt::format("{} beads of {:.3g} nm were found and masked", beads,
-                        io::number_or_nan(mask.at("bead_diameter_nm")));
+  else if (masks.bead_masking == tilt_series::BeadMasking::kMasked)
+    text += fmt::format("{} were found and masked", describe_beads(masks));
   else
-    text += fmt::format(
-        "{} beads of {:.3g} nm were found and kept (blue), because that predicts views better",
-        beads, io::number_or_nan(mask.at("bead_diameter_nm")));
+    text += fmt::format("{} were found and kept (blue), because that predicts views better",
+                        describe_beads(masks));
   return text + fmt::format("; {} hot or dead pixels; {:.1f} % of all pixels are masked.",
-                            mask.at("bad_pixels").get<std::int64_t>(),
-                            100 * io::number_or_nan(mask.at("masked_part")));
+                            masks.num_bad_pixels, 100 * masked.mean_part());
 }
 
 void add_pictures(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
-  const json& metrics = fits.front().metrics;
+  const record::FitMetrics& metrics = fits.front().metrics();
   page.add_heading("Masks");
-  page.add_paragraph(mask_text(metrics.at("mask")));
+  page.add_paragraph(mask_text(metrics.mask));
   page.add_figures({{source.pictures.mask, "The view of lowest tilt"}}, FigureSize::kLarge);
   if (const std::string plot = masked_plot(fits); !plot.empty()) page.add_svg(plot);
   if (!source.pictures.tree) return;
@@ -269,9 +252,8 @@ void add_pictures(const ReportSource& source, const AllFits& fits, HtmlPage& pag
   page.add_paragraph(
       "Leaves of the adaptive tree over the central XY plane. They are small where the density "
       "varies much.");
-  page.add_figures(
-      {{*source.pictures.tree, fmt::format("{} leaves", metrics.at("leaves").get<int>())}},
-      FigureSize::kLarge);
+  page.add_figures({{*source.pictures.tree, fmt::format("{} leaves", metrics.num_leaves)}},
+                   FigureSize::kLarge);
 }
 
 // Adds a plot with its heading and explanation, if there is one.
@@ -314,7 +296,7 @@ void add_dial(const ReportSource& source, HtmlPage& page) {
       "strong one loses what you want to see, give --denoise light; where the medium one is too "
       "grainy, give --denoise strong, or any factor such as 1.5. The whole fit is a little "
       "smoother than these.",
-      source.record.at("options").at("fit").at("denoise").get<std::string>()));
+      source.options.fit.denoise));
   page.add_figures({{*source.pictures.dial,
                      "The trials whose weights are nearest to half of the chosen one, to the "
                      "chosen one, and to twice it. --denoise takes the factors"}},
@@ -324,7 +306,7 @@ void add_dial(const ReportSource& source, HtmlPage& page) {
 // Shows what the learned prior changes, if trials have compared it.
 void add_prior_picture(const ReportSource& source, HtmlPage& page) {
   if (!source.pictures.prior) return;
-  const bool is_used = source.record.at("options").at("fit").at("prior") == "learned";
+  const bool is_used = source.options.fit.prior == Prior::kLearned;
   page.add_heading("The learned prior");
   page.add_paragraph(fmt::format(
       "The same section from two fits of some rows, without some views. {} (docs/prior.md).",
@@ -345,10 +327,10 @@ void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
       "settings are at 0; bars are two standard errors long. Errors are compared patch by patch of "
       "these views (the median over pairs of patches). The weight lies between those that were "
       "tried, and a concave penalty is taken only if it is surely better (docs/fitting.md).",
-      trials_plot(fits.front().metrics), page);
+      trials_plot(source.record.fit.tuned), page);
   add_dial(source, page);
   add_prior_picture(source, page);
-  if (source.alignment) add_alignment(*source.alignment, page);
+  if (source.record.fit.alignment) add_alignment(*source.record.fit.alignment, page);
   add_plot("Loss",
            "The fit begins with coarse pixels, whose noise is lower; the curves jump where it goes "
            "on with finer ones. Held-out views that get worse while the fitted ones improve would "
@@ -384,35 +366,30 @@ void add_views(const AllFits& fits, HtmlPage& page) {
       displacement_plot(fits), page);
 }
 
-void add_halves(const json& record, HtmlPage& page) {
-  for (const json* object : {&record, &record.at("metrics")}) {
-    const auto halves = object->find("halves");
-    if (halves == object->end() || !halves->is_object() || !halves->contains("fsc")) continue;
-    add_plot("Halves",
-             "Fourier shell correlation of two fits to halves of the data. Both fits prefer smooth "
-             "volumes in the same way, so the curve says more about what they share than about the "
-             "resolution of the specimen.",
-             halves_plot(halves->at("fsc")), page);
-  }
+void add_halves(const record::HalvesRecord& halves, HtmlPage& page) {
+  add_plot("Halves",
+           "Fourier shell correlation of two fits to halves of the data. Both fits prefer smooth "
+           "volumes in the same way, so the curve says more about what they share than about the "
+           "resolution of the specimen.",
+           halves_plot(halves.fsc.fsc), page);
 }
 
-void add_costs(const json& verdict, const json& metrics, HtmlPage& page) {
+void add_costs(const record::FitRecord& fit, HtmlPage& page) {
+  const record::FitMetrics& metrics = fit.metrics;
+  const verdict::Verdict& verdict = fit.verdict;
   page.add_heading("Time and memory");
   page.add_paragraph(fmt::format(
       "The whole run took {}, of which the fit {} ({} steps, {} parameters); at most {:.2f} GiB of "
       "memory. {}.",
-      time_text(io::number_or_nan(verdict.at("seconds"))),
-      time_text(io::number_or_nan(metrics.at("seconds"))), metrics.at("steps").get<std::int64_t>(),
-      metrics.at("parameters").get<std::int64_t>(), io::number_or_nan(verdict.at("peak_GiB")),
-      metrics.at("threads_why").get<std::string>()));
+      time_text(verdict.seconds), time_text(metrics.seconds), metrics.steps, metrics.num_parameters,
+      verdict.peak_GiB, metrics.threads_why));
   std::vector<std::vector<HtmlCell>> rows{
       {{"stage", ""}, {"epochs", ""}, {"pixels binned by", ""}, {"field", ""}}};
-  for (const json& stage : metrics.at("stages"))
-    rows.push_back(
-        {{fmt::format("{}", rows.size()), ""},
-         {fmt::format("{}", stage.at("epochs").get<int>()), ""},
-         {fmt::format("{}", stage.at("bin").get<int>()), ""},
-         {stage.at("field").get<std::string>() == "grid" ? "plain vertices" : "factors", ""}});
+  for (const fit::Stage& stage : metrics.stages)
+    rows.push_back({{fmt::format("{}", rows.size()), ""},
+                    {fmt::format("{}", stage.epochs), ""},
+                    {fmt::format("{}", stage.bin), ""},
+                    {stage.field_kind == FieldKind::kGrid ? "plain vertices" : "factors", ""}});
   page.add_table(rows);
 }
 
@@ -421,29 +398,28 @@ void add_costs(const json& verdict, const json& metrics, HtmlPage& page) {
 std::string run_report(const ReportSource& source) {
   const base::TraceSpan span("report");
   const AllFits fits = fits_of(source.record);
-  const json& metrics = fits.front().metrics;
-  const json& verdict = source.record.at("metrics").at("verdict");
+  const record::FitRecord& fit = source.record.fit;
   const std::vector<float> sample = sample_voxels(io::MrcReader(source.volume));
   const EmbeddedVolume volume = embed_volume(source.volume);
   HtmlPage page("Tomogram of " + source.files.stack.filename().string());
   page.add_paragraph(fmt::format("{}, reconstructed with tomofield {} ({})",
                                  source.files.stack.string(), library_version(),
                                  base::source_commit()));
-  add_verdict(verdict, page);
-  std::vector<HtmlFact> facts = facts_of_size(fits, volume);
-  std::ranges::move(facts_of_fit(verdict, metrics, source.alignment), std::back_inserter(facts));
+  add_verdict(fit.verdict, page);
+  std::vector<HtmlFact> facts = facts_of_size(fit.metrics, volume);
+  std::ranges::move(facts_of_fit(fit), std::back_inserter(facts));
   page.add_facts(facts);
-  add_volume(source.record, volume, page);
+  add_volume(source.options.volume.axes, volume, page);
   add_input(source, page);
   add_pictures(source, fits, page);
   add_fit(source, fits, page);
   add_views(fits, page);
-  add_halves(source.record, page);
+  if (source.record.halves) add_halves(*source.record.halves, page);
   add_plot("Histogram",
            "Densities of up to 32 evenly spaced sections of the tomogram. One narrow peak with a "
            "tail on the side of dense matter is usual.",
            histogram_plot(sample), page);
-  add_costs(verdict, metrics, page);
+  add_costs(fit, page);
   return page.document();
 }
 

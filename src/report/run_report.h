@@ -1,11 +1,10 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
-#include "align/alignment_record.h"
+#include "record/run_record.h"
 #include "tomofield/options.h"
 
 namespace tomofield::report {
@@ -18,10 +17,9 @@ struct ReportPictures {
 
 /// What the report of a run is made from. Files may still have temporary names.
 struct ReportSource {
-  const nlohmann::json& record;  ///< the content of the JSON file beside the volume
+  const record::RunRecord& record;
   const SeriesFiles& files;      ///< of the series
   const Options& options;        ///< as the run used them
-  const std::optional<alignment::AlignmentRecord>& alignment;  ///< before the fit, if there was one
   std::filesystem::path volume;  ///< the file that holds the tomogram (MRC)
   ReportPictures pictures;
 };

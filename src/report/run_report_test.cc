@@ -10,39 +10,30 @@
 namespace tomofield::report {
 namespace {
 
-using nlohmann::json;
-
-// Returns the metrics of a fit of two views, as output::metrics_json() and others write them.
-json metrics_of_fit(double residual) {
-  const auto view = [&](double tilt_deg) {
-    return json{{"tilt_deg", tilt_deg}, {"scale", 1.0},  {"offset", 0.0},
-                {"noise_sigma", 2.0},   {"weight", 1.0}, {"residual", residual}};
-  };
-  return {{"views", {view(10), view(20)}},
-          {"mean_squared_residual_per_noise_variance", {9.0, residual}},
-          {"held_out", nullptr},
-          {"tuning", nullptr},
-          {"mask",
-           {{"beads", 0},
-            {"bead_masking", "none"},
-            {"bad_pixels", 0},
-            {"masked_part", 0.0},
-            {"views", json::array()}}},
-          {"stages", json::array({{{"epochs", 2}, {"bin", 1}, {"field", "grid"}}})},
-          {"threads", 2},
-          {"threads_why", "2 threads"},
-          {"steps", 4},
-          {"parameters", 100},
-          {"seconds", 1.5},
-          {"leaves", 1},
-          {"verdict",
-           {{"residual", residual},
-            {"held_out", nullptr},
-            {"prior", {{"learned", false}, {"gain", -0.04}, {"standard_error", 0.01}}},
-            {"views", nullptr},
-            {"seconds", 7000},
-            {"peak_GiB", 1.5},
-            {"warnings", json::array({{{"code", "thin"}, {"message", "it seems <thin>"}}})}}}};
+// Returns the record of a fit of two views.
+record::FitRecord fit_with(double residual) {
+  record::FitRecord fit{.metrics = {}, .verdict = {}, .alignment = {}, .tuned = {}};
+  fit.metrics.num_parameters = 100;
+  fit.metrics.num_leaves = 1;
+  fit.metrics.steps = 4;
+  fit.metrics.data_loss = {9.0, residual};
+  fit.metrics.stages = {{.field_kind = FieldKind::kGrid, .bin = 1, .first_epoch = 0, .epochs = 2}};
+  fit.metrics.seconds = 1.5;
+  fit.metrics.threads = 2;
+  fit.metrics.threads_why = "2 threads";
+  for (const double tilt_deg : {10.0, 20.0})
+    fit.metrics.views.push_back({.tilt_deg = tilt_deg,
+                                 .scale = 1.0,
+                                 .noise_sigma = 2.0,
+                                 .residual = residual,
+                                 .weight = 1.0});
+  fit.metrics.mask.part = {0.0, 0.0};
+  fit.verdict.residual = residual;
+  fit.verdict.prior.gain = tune::Difference{.log_ratio = -0.04, .standard_error = 0.01};
+  fit.verdict.seconds = 7000;
+  fit.verdict.peak_GiB = 1.5;
+  fit.verdict.warnings = {{.code = "thin", .message = "it seems <thin>"}};
+  return fit;
 }
 
 class RunReport : public ::testing::Test {
@@ -57,15 +48,13 @@ class RunReport : public ::testing::Test {
     io::write_png_grey(directory_ / "mask.png", 2, 2, std::vector<std::uint8_t>{0, 1, 2, 3});
     files_.stack = "series.mrc";
     options_.specimen.thickness = 2;
-    record_ = {{"options", options::options_json(options::run_options(files_, options_))},
-               {"metrics", metrics_of_fit(1.25)}};
+    record_.fit = fit_with(1.25);
   }
 
   std::string page() const {
     return run_report({.record = record_,
                        .files = files_,
                        .options = options_,
-                       .alignment = alignment_,
                        .volume = directory_ / "volume.mrc",
                        .pictures = {.mask = directory_ / "mask.png",
                                     .tree = {},
@@ -78,8 +67,7 @@ class RunReport : public ::testing::Test {
   const testing::ScratchDirectory directory_;
   SeriesFiles files_;
   Options options_;
-  std::optional<alignment::AlignmentRecord> alignment_;
-  json record_;
+  record::RunRecord record_;
 };
 
 TEST_F(RunReport, ShowsWarningsAndNumbers) {
@@ -92,45 +80,57 @@ TEST_F(RunReport, ShowsWarningsAndNumbers) {
   EXPECT_FALSE(page_has("even half"));
 }
 
+TEST_F(RunReport, ShowsTheDiameterOfBeadsThatWereFound) {
+  EXPECT_FALSE(page_has("found in the views"));
+  json& mask = record_["metrics"]["mask"];
+  mask.update({{"beads", 8}, {"bead_masking", "masked"}, {"bead_diameter_nm", 10.25}});
+  EXPECT_TRUE(page_has("10.2 nm"));
+  EXPECT_TRUE(page_has("found in the views"));
+  options_.views.bead_diameter_nm = 12;
+  EXPECT_FALSE(page_has("found in the views"));
+}
+
 TEST_F(RunReport, SaysWhetherTheLearnedPriorHelped) {
   EXPECT_TRUE(page_has("Learned prior"));
   EXPECT_TRUE(page_has("+4.00 % ± 1.00"));
-  json& prior = record_["metrics"]["verdict"]["prior"];
-  prior = {{"learned", true}, {"gain", 0.013}, {"standard_error", 0.002}};
+  verdict::PriorSummary& prior = record_.fit.verdict.prior;
+  prior = {.is_used = true, .gain = tune::Difference{.log_ratio = 0.013, .standard_error = 0.002}};
   EXPECT_TRUE(page_has("-1.30 % ± 0.20"));
-  prior = {{"learned", false}, {"gain", nullptr}, {"standard_error", nullptr}};
+  prior = {};
   EXPECT_FALSE(page_has("Learned prior"));
 }
 
 TEST_F(RunReport, ShowsHowFarGoldBeadsLieFromTheirPlacesAndThePose) {
   EXPECT_FALSE(page_has("Gold beads"));
-  alignment_ = {.is_accepted = true,
-                .held_out = {.before = 0.2, .after = 0.1, .gain = {}},
-                .beads = alignment::BeadRecord{.num_beads = 12,
-                                               .files_px = 1.25,
-                                               .before_px = 0.5,
-                                               .after_px = 0.25,
-                                               .is_accepted = true}};
+  std::optional<alignment::AlignmentRecord>& found = record_.fit.alignment;
+  found = {.is_accepted = true,
+           .held_out = {.before = 0.2, .after = 0.1, .gain = {}},
+           .beads = alignment::BeadRecord{.num_beads = 12,
+                                          .files_px = 1.25,
+                                          .before_px = 0.5,
+                                          .after_px = 0.25,
+                                          .is_accepted = true}};
   for (const double tilt_deg : {10.0, 20.0})
-    alignment_->views.push_back({.tilt_deg = tilt_deg,
-                                 .shift_px = {1.0, 2.0},
-                                 .agreement = {.correlation = 0.9, .error_px = {0.1, 0.1}}});
+    found->views.push_back({.tilt_deg = tilt_deg,
+                            .shift_px = {1.0, 2.0},
+                            .agreement = {.correlation = 0.9, .error_px = {0.1, 0.1}}});
   EXPECT_FALSE(page_has("Thickness and pitch"));
-  alignment_->pose = {.pose = {.thickness_px = 190.2, .pitch_deg = -4.7, .x_tilt_deg = 1.5},
-                      .error = {.thickness_px = 18.0, .pitch_deg = 0.8, .x_tilt_deg = 0.6}};
+  found->pose = {.pose = {.thickness_px = 190.2, .pitch_deg = -4.7, .x_tilt_deg = 1.5},
+                 .error = {.thickness_px = 18.0, .pitch_deg = 0.8, .x_tilt_deg = 0.6}};
   EXPECT_TRUE(page_has("190 ± 18 px, -4.7 ± 0.8°, 1.5 ± 0.6°"));
   EXPECT_TRUE(page_has("0.25 px"));
   EXPECT_TRUE(page_has("of the files: 1.25 px"));
-  alignment_->is_accepted = false;
+  found->is_accepted = false;
   EXPECT_TRUE(page_has("1.25 px"));
   EXPECT_TRUE(page_has("not taken: 0.25 px"));
 }
 
 TEST_F(RunReport, ShowsBothHalvesAndTheirCorrelation) {
-  record_["halves"] = {
-      {"fsc", {{"frequency_per_A", {0.01, 0.02}}, {"all", {{"correlation", {1.0, nullptr}}}}}},
-      {"even", {{"metrics", metrics_of_fit(1.2)}}},
-      {"odd", {{"metrics", metrics_of_fit(1.3)}}}};
+  record::HalvesRecord& halves = record_.halves.emplace();
+  halves.halves[0].fit = fit_with(1.2);
+  halves.halves[1].fit = fit_with(1.3);
+  halves.fsc.fsc.frequency_per_A = {0.01, 0.02};
+  halves.fsc.fsc.all.correlation = {1.0, std::nan("")};
   EXPECT_TRUE(page_has("fitted views, all data"));
   EXPECT_TRUE(page_has("fitted views, even"));
   EXPECT_TRUE(page_has("<h2>Halves</h2>"));

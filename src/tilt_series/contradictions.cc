@@ -99,6 +99,15 @@ void warn_of_other_axis(const StatedAxis& stated, double aligned_axis_deg,
                   alignment, aligned_axis_deg, stated.source, stated.angle_deg));
 }
 
+void warn_of_given_axis(double given_deg, const std::optional<StatedAxis>& stated) {
+  constexpr double kLargestChangeOfAxis_deg = 3.0;  // alignments refine nominal axes by less
+  if (!stated || angle_between_axes(stated->angle_deg, given_deg) <= kLargestChangeOfAxis_deg)
+    return;
+  base::log_warning(fmt::format(
+      "--tilt-axis turns the views by {:.4g}°, and {} states {:.4g}°: the given one is taken",
+      given_deg, stated->source, stated->angle_deg));
+}
+
 void warn_of_unknown_axis(const io::ImageStack& stack) {
   base::log_warning(fmt::format(
       "no file states the tilt axis of '{}': it is looked for within some degrees of the "

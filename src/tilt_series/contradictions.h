@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "io/images/image_stack.h"
 #include "io/tables/alignment_files.h"
@@ -23,6 +24,9 @@ void warn_of_other_angles(const TiltAngles& used, const io::ImageStack& stack);
 /// Warns if an alignment turns the views by another axis than the one that a file states.
 void warn_of_other_axis(const StatedAxis& stated, double aligned_axis_deg,
                         const TiltSeriesOptions& options, const io::ImageStack& stack);
+
+/// Warns if --tilt-axis is another axis than the one that files state, if they do.
+void warn_of_given_axis(double given_deg, const std::optional<StatedAxis>& stated);
 
 /// Warns that a raw stack is aligned whose tilt axis no file states.
 void warn_of_unknown_axis(const io::ImageStack& stack);

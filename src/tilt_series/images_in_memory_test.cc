@@ -76,7 +76,7 @@ TEST(ImagesInMemory, RefuseCountsThatDoNotAgree) {
     options.images = io::image_stack_in_memory(all_values(), kWidth, kHeight, {0, 1, 90}, 1.0);
     const TiltSeries series(options);
   });
-  EXPECT_NE(message.find("images in memory"), std::string::npos) << message;
+  EXPECT_NE(message.find("views in memory"), std::string::npos) << message;
 }
 
 }  // namespace

@@ -85,6 +85,18 @@ StatedAxis nominal_axis(const SectionTable& table) {
           fmt::format("'{}', whose views are not aligned yet", table.source)};
 }
 
+/// Returns the axis that files state: a table of views that are not aligned yet, or what
+/// find_stated_axis() finds without --tilt-axis.
+std::optional<StatedAxis> axis_of_files(const TiltSeriesOptions& options,
+                                        const io::ImageStack& stack,
+                                        const std::optional<SectionTable>& table,
+                                        const std::optional<io::Mdoc>& mdoc) {
+  if (table && table->is_nominal) return nominal_axis(*table);
+  TiltSeriesOptions without = options;
+  without.tilt_axis_deg.reset();
+  return find_stated_axis(without, stack, mdoc, /*is_aligned=*/true);
+}
+
 /// Returns the alignment that files give, or that by the tilt axis of a raw stack; nothing for an
 /// aligned stack. Throws Error for a raw stack that nobody aligns.
 std::optional<InPlaneAlignment> find_alignment(const TiltSeriesOptions& options,
@@ -97,9 +109,9 @@ std::optional<InPlaneAlignment> find_alignment(const TiltSeriesOptions& options,
   if (axis->is_given || options.starts_raw) return alignment_of_axis(axis->angle_deg, stack);
   if (table) {
     throw Error(fmt::format(
-        "'{}' is not aligned yet: it has the nominal tilts and a tilt axis of {:.6g}°. --align "
-        "full "
-        "begins with them; or give the table that RELION's job 'Align tilt-series' wrote",
+        "'{}' is not aligned yet: it has the nominal tilts and a tilt axis of {:.6g}°. `tomofield "
+        "reconstruct` and `align` begin with them if --align full is given; or give the table that "
+        "RELION's job 'Align tilt-series' wrote",
         table->source, axis->angle_deg));
   }
   require_vertical(*axis, stack);
@@ -158,9 +170,15 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& s
     const double stated_A = pixel_size_of_mdoc(*mdoc, *options.mdoc, stack);
     if (stated_A > 0.0) return stated_A;
   }
-  if (in_header_A > 0.0) return in_header_A;
+  if (in_header_A > 0.0 && !is_default) return in_header_A;
+  if (stack.is_in_memory()) {
+    if (in_header_A > 0.0) return in_header_A;
+    throw Error("views in memory have no pixel size: give it in Å with --pixel-size");
+  }
   base::log_warning(fmt::format(
-      "'{}' has no pixel size; 1 Å is assumed (give it with --pixel-size)", stack.name()));
+      "'{}' {}; 1 Å is assumed (give it with --pixel-size)", stack.name(),
+      in_header_A == 0.0 ? "has no pixel size"
+                         : "states pixels of 1 Å, as programs write that do not know their size"));
   return 1.0;
 }
 
@@ -303,6 +321,8 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
     if (mdoc) warn_of_other_angles(angles, *options.mdoc, *mdoc, stack);
     warn_of_other_angles(angles, stack);
     if (axis && alignment) warn_of_other_axis(*axis, alignment->axis_deg(), options, stack);
+    if (options.tilt_axis_deg)
+      warn_of_given_axis(*options.tilt_axis_deg, axis_of_files(options, stack, table, mdoc));
     if (options.starts_raw && !axis && !alignment) warn_of_unknown_axis(stack);
   }
 

@@ -41,6 +41,17 @@ TiltAngles angles_of_table(const SectionTable& table) {
   return angles;
 }
 
+// Says that angles of sections, counted from 1, are not numbers.
+std::string describe_unusable(const TiltAngles& angles, const std::vector<std::int64_t>& sections) {
+  const bool is_one = sections.size() == 1;
+  return fmt::format(
+      "'{0}': the tilt angle{1} of section{1} {2} {3} not a finite number; correct {4}, or leave "
+      "the "
+      "section{1} out with --exclude {2}",
+      angles.source, is_one ? "" : "s", io::section_list(sections), is_one ? "is" : "are",
+      is_one ? "it" : "them");
+}
+
 // Describes sections, counted from 1, that are tilted too far.
 std::string describe_steep(const TiltAngles& angles, const std::vector<std::int64_t>& steep) {
   std::vector<std::string> texts;
@@ -75,6 +86,7 @@ void require_different(const TiltAngles& angles, std::span<const std::int64_t> s
 }  // namespace
 
 std::string source_of_header(const io::ImageStack& stack) {
+  if (stack.is_in_memory()) return fmt::format("tilt angles of {}", stack.name());
   return fmt::format("extended header of {}", stack.name());
 }
 
@@ -113,12 +125,14 @@ TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::ImageSta
 }
 
 void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t> sections) {
-  std::vector<std::int64_t> missing, steep;
+  std::vector<std::int64_t> missing, unusable, steep;
   for (const std::int64_t section : sections) {
     const auto& angle = angles.of_section[static_cast<std::size_t>(section)];
     if (!angle)
       missing.push_back(section + 1);
-    else if (!(std::fabs(angle->value) <= kLargestTilt_deg))  // also if it is not a number
+    else if (!std::isfinite(angle->value))
+      unusable.push_back(section + 1);
+    else if (std::fabs(angle->value) > kLargestTilt_deg)
       steep.push_back(section + 1);
   }
   if (!missing.empty()) {
@@ -128,6 +142,7 @@ void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t
                     angles.source, missing.size() == 1 ? "" : "s", io::section_list(missing),
                     missing.size() == 1 ? "it" : "them"));
   }
+  if (!unusable.empty()) throw Error(describe_unusable(angles, unusable));
   if (!steep.empty()) throw Error(describe_steep(angles, steep));
   require_different(angles, sections);
 }

@@ -27,7 +27,8 @@ TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::ImageSta
                             const std::optional<SectionTable>& table,
                             const std::optional<io::Mdoc>& mdoc);
 
-/// Returns what TiltAngles::source is for angles in the extended header of a stack.
+/// Returns what TiltAngles::source is for angles in the extended header of a stack, or of views in
+/// memory.
 std::string source_of_header(const io::ImageStack& stack);
 
 /// Throws Error with both numbers and both files unless they are equal.

@@ -87,12 +87,13 @@ std::optional<StatedAxis> find_stated_axis(const TiltSeriesOptions& options,
 
 void require_vertical(const StatedAxis& axis, const io::ImageStack& stack) {
   if (angle_between_axes(axis.angle_deg, 0.0) <= kVertical_deg) return;
-  throw Error(fmt::format(
-      "{}: the tilt axis is turned by {:.6g}° from the vertical, so '{}' must be aligned: --align "
-      "full begins with this axis, --xf or --aln give an alignment, and --ignore TiltAxisAngle "
-      "says "
-      "that its views are aligned already",
-      axis.source, axis.angle_deg, stack.name()));
+  throw Error(
+      fmt::format("{}: the tilt axis is turned by {:.6g}° from the vertical, so '{}' must be "
+                  "aligned: `tomofield "
+                  "reconstruct` and `align` begin with this axis if --align full is given, --xf or "
+                  "--aln give an "
+                  "alignment, and --ignore TiltAxisAngle says that its views are aligned already",
+                  axis.source, axis.angle_deg, stack.name()));
 }
 
 }  // namespace tomofield::tilt_series

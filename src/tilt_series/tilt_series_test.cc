@@ -176,6 +176,10 @@ TEST(TiltSeries, PixelSizeOfTheMdocWhereTheHeaderHasNone) {
   const WarningCatcher warnings;
   EXPECT_DOUBLE_EQ(TiltSeries(options).pixel_size_A(), 1.0);
   expect_parts(warnings.text(), {"no pixel size", "--pixel-size"});
+  write_stack(options.stack, 16, 12, 1, some_value, 1.0);
+  const WarningCatcher of_one;
+  EXPECT_DOUBLE_EQ(TiltSeries(options).pixel_size_A(), 1.0);
+  expect_parts(of_one.text(), {"states pixels of 1 Å", "--pixel-size"});
 }
 
 TEST(TiltSeries, AnMdocOfAnotherSeriesIsSaid) {

@@ -107,4 +107,8 @@ TunedFit tuned_from(const json& tuning) {
   return tuned;
 }
 
+void write_choice(const std::filesystem::path& file, const std::optional<TunedFit>& tuned) {
+  io::write_json(file, tuned ? tuning_json(*tuned) : json(nullptr));
+}
+
 }  // namespace tomofield::tune

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <vector>
 
 #include "tune/trial_settings.h"
@@ -42,5 +44,8 @@ FitTrial trial_from(const nlohmann::json& entry);
 /// them as trial_from() does.
 nlohmann::json tuning_json(const TunedFit& tuned);
 TunedFit tuned_from(const nlohmann::json& tuning);
+
+/// Writes tuning_json() to a file, or null without trials.
+void write_choice(const std::filesystem::path& file, const std::optional<TunedFit>& tuned);
 
 }  // namespace tomofield::tune

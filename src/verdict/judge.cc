@@ -62,7 +62,8 @@ Verdict judge(const FinishedFit& finished, const std::optional<measurement::View
                                              .alignment = finished.alignment,
                                              .tilt_deg = series.geometry.tilt_deg,
                                              .thickness = series.geometry.thickness,
-                                             .bin_factor = series.bin_factor});
+                                             .bin_factor = series.bin_factor,
+                                             .aligned_before = finished.options.run.align});
   return verdict;
 }
 

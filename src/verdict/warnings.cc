@@ -217,7 +217,7 @@ double axis_deficit(const AxisCheck& axis) {
   return (axis.best - axis.vertical) / (axis.best - axis.usual);
 }
 
-std::optional<Warning> wrong_axis(const Verdict& verdict) {
+std::optional<Warning> wrong_axis(const Verdict& verdict, Alignment aligned_before) {
   if (!verdict.views->axis) return std::nullopt;
   const AxisCheck& axis = *verdict.views->axis;
   const double contrast = axis.best - axis.usual;
@@ -227,12 +227,16 @@ std::optional<Warning> wrong_axis(const Verdict& verdict) {
   const bool is_clear_in_noise =
       contrast > kLeastAxisContrastOfNoise && axis.vertical < kLeastVerticalOfNoise * axis.best;
   if (!leaves_residual && !is_clear_in_noise) return std::nullopt;
-  return Warning{"tilt-axis",
-                 fmt::format("the tilt axis seems not to be vertical in the aligned views, because "
-                             "what they have in common lies along a direction about {:.0f}° from "
-                             "the y axis: give the transforms with the rotation of the axis (--xf "
-                             "or --aln), or find it with --align full",
-                             axis.direction_deg)};
+  return Warning{
+      "tilt-axis",
+      fmt::format("the tilt axis seems not to be vertical in the aligned views, because "
+                  "what they have in common lies along a direction about {:.0f}° from "
+                  "the y axis: give {}",
+                  axis.direction_deg,
+                  aligned_before == Alignment::kFull
+                      ? "the direction from which --align full begins (--tilt-axis)"
+                      : "the transforms with the rotation of the axis (--xf or --aln), or "
+                        "find it with --align full")};
 }
 
 bool is_axis_sure(const Verdict& verdict) {
@@ -315,7 +319,24 @@ std::optional<Warning> wrong_defocus_hand(const DefocusCheck& check) {
                              1 + check.slope->error, check.slope->standard_error)};
 }
 
-std::optional<Warning> unexplained(const Verdict& verdict) {
+// Says what is left to be done about the alignment of views that are not explained.
+const char* advice_on_alignment(Alignment aligned_before) {
+  switch (aligned_before) {
+    case Alignment::kOff:
+      return "the alignment, first of all the direction of the tilt axis (--align refine shows "
+             "what "
+             "it would gain)";
+    case Alignment::kRefine:
+      return "the alignment that was refined, first of all the direction of the tilt axis (--align "
+             "full begins with the views as recorded)";
+    case Alignment::kFull:
+      return "the direction of the tilt axis, with which --align full began (--tilt-axis gives "
+             "another one)";
+  }
+  return "";
+}
+
+std::optional<Warning> unexplained(const Verdict& verdict, Alignment aligned_before) {
   double far = 0.0;
   if (verdict.views)
     far = std::min(verdict.views->far_correlation[0], verdict.views->far_correlation[1]);
@@ -326,10 +347,9 @@ std::optional<Warning> unexplained(const Verdict& verdict) {
       "residual",
       fmt::format(
           "the tomogram does not explain the views: it leaves {:.2g} times the variance of "
-          "their noise. Check the tilt angles and the alignment, first of all the direction "
-          "of the tilt axis (--align refine shows what it would gain), and look for views "
-          "that are damaged or differ from the rest",
-          verdict.residual)};
+          "their noise. Check the tilt angles and {}, and look for views that are damaged or "
+          "differ from the rest",
+          verdict.residual, advice_on_alignment(aligned_before))};
 }
 
 std::optional<Warning> speckled(const Verdict& verdict) {
@@ -365,7 +385,7 @@ std::vector<Warning> faults_of_views(const Verdict& verdict, const GivenInput& i
   if (!is_contrast_wrong)
     if (const auto alignment = misaligned(views, input.alignment)) found.push_back(*alignment);
   if (!found.empty()) return found;
-  if (const auto axis = wrong_axis(verdict)) found.push_back(*axis);
+  if (const auto axis = wrong_axis(verdict, input.aligned_before)) found.push_back(*axis);
   return found;
 }
 
@@ -383,7 +403,7 @@ std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& inp
   add(thickness_warning(verdict, input));
   if (verdict.views) add(correlated_noise(verdict, input.bin_factor));
   if (!warnings.empty()) return warnings;
-  add(unexplained(verdict));
+  add(unexplained(verdict, input.aligned_before));
   add(speckled(verdict));
   add(overfitted(verdict));
   return warnings;

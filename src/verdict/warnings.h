@@ -13,9 +13,10 @@ struct GivenInput {
   Contrast contrast = Contrast::kDark;
   /// Where the pixels of each aligned view come from in the stack.
   std::vector<geometry::RawFromAligned> alignment = {};
-  std::vector<double> tilt_deg = {};  ///< of each view
-  double thickness = 0.0;             ///< in pixels of the fit
-  double bin_factor = 1.0;            ///< of these pixels to the stack's
+  std::vector<double> tilt_deg = {};           ///< of each view
+  double thickness = 0.0;                      ///< in pixels of the fit
+  double bin_factor = 1.0;                     ///< of these pixels to the stack's
+  Alignment aligned_before = Alignment::kOff;  ///< RunOptions::align
 };
 
 /// Returns what is off in a run, the most serious first. Faults of the series as a whole (views

@@ -46,6 +46,25 @@ TEST(Warnings, AGoodRunHasNone) {
   EXPECT_EQ(codes(raw_views), "");
 }
 
+TEST(Warnings, AdviceOnTheAlignmentIsWhatIsLeftToTry) {
+  Verdict verdict = good_verdict();
+  verdict.residual = 50;
+  GivenInput input = aligned_input();
+  const auto advice = [&](Alignment before) {
+    input.aligned_before = before;
+    const auto found = find_warnings(verdict, input);
+    EXPECT_EQ(codes(verdict, input), "residual ");
+    return found.front().message;
+  };
+  const auto has = [](const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos;
+  };
+  EXPECT_TRUE(has(advice(Alignment::kOff), "--align refine shows what it would gain"));
+  EXPECT_TRUE(has(advice(Alignment::kRefine), "--align full begins with the views as recorded"));
+  EXPECT_FALSE(has(advice(Alignment::kFull), "--align refine"));
+  EXPECT_TRUE(has(advice(Alignment::kFull), "--tilt-axis gives another one"));
+}
+
 TEST(Warnings, ContrastIsWrongIfLongRaysLookThin) {
   Verdict verdict = good_verdict();
   verdict.views->path = {.correlation = -0.9, .rise = -4.0};

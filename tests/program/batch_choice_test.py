@@ -94,6 +94,11 @@ def test_all_series_of_a_batch_get_the_median_choice_of_three(once, each):
         assert used == {key: choice[key] for key in used}
         assert f"--tv={choice['tv']:g}" in commands(once)[name]
         assert f"--prior={choice['prior']}" in commands(once)[name]
+        choosers = {origin["option"]: origin["file"] for origin in read(once, f"{name}.json")["origins"]}
+        assert set(choosers) >= {"--tv-penalty", "--tv", "--prior"}, choosers
+        assert set(choosers.values()) == {os.path.join(once, "choice.json")}
+        with open(os.path.join(once, f"{name}_report.html"), encoding="utf-8") as file:
+            assert "choice.json: choice for all series of the batch" in file.read()
     text = page(once)
     assert f"{choice['tv_penalty']} tv {choice['tv']:.3g}" in text and "trials of a (" in text
 

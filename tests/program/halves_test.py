@@ -312,6 +312,17 @@ def test_the_log_says_what_the_halves_are_not_for(series):
     assert "--denoising-halves" in run.stderr and "too optimistic" in run.stderr
 
 
+def test_the_log_says_that_halves_have_no_prior():
+    series = harness.Series("prior")
+    output = os.path.join(harness.fresh_directory("prior_log"), "out.mrc")
+    said = harness.succeed("reconstruct", *series.input, "--thickness", harness.THICKNESS, "--contrast",
+                           "bright", "--no-margin", "--epochs", 1, "--coarse-epochs", 0, "--prior",
+                           "learned", "--tv-penalty", "smooth", "--split-tilts", "-o", output).stderr
+    for line in ("even half: 10 views, without the learned prior", "odd half: 11 views, without the"):
+        assert line in said, said
+    assert "all data: 21 views\n" in said
+
+
 def test_refusals(series):
     results = fresh("refused")
     small = series.write("small", series.odd[:, 1:])

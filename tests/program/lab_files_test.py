@@ -200,6 +200,40 @@ def test_what_the_axis_cannot_be_told_from_is_asked_for():
            "warning: no file states the tilt axis of 'TS_01.mrc'")
 
 
+def test_a_given_axis_that_contradicts_the_files_is_said():
+    folder = write_series("contradiction", 85.3)
+    write(folder, "TS_01.mdoc", mdoc_text(head="[T = Tilt axis angle = 85.3, binning = 1]"))
+    said = dry(folder, "TS_01.mdoc", "--tilt-axis", 40)
+    expect(said, "warning: --tilt-axis turns the views by 40°, and 'TS_01.mdoc', line 1 states 85.3°")
+    for same in (86, 85.3 - 180):
+        assert "--tilt-axis turns" not in dry(folder, "TS_01.mdoc", "--tilt-axis", same)
+    nominal = write_series("nominal_axis", 85.3, stack="TS_01.mrcs")
+    write(nominal, "TS_01.star", "\ndata_TS_01\n\nloop_\n_rlnMicrographName\n"
+          "_rlnTomoNominalStageTiltAngle\n_rlnTomoNominalTiltAxisAngle\n"
+          + "".join(f"{i + 1:06}@TS_01.mrcs {tilt:.2f} 85.3\n" for i, tilt in enumerate(TILTS)))
+    expect(dry(nominal, "TS_01.star", "--tilt-axis", 40), "turns the views by 40°", "states 85.3°")
+
+
+@pytest.mark.parametrize("words", (["info"], ["baseline", "wbp", "-o", "x.mrc"],
+                                   ["compare", "--methods", "wbp", "-o", "x"]))
+def test_commands_without_align_name_those_that_have_it(words):
+    folder = write_series("no_align", 85.3)
+    write(folder, "TS_01.mdoc", mdoc_text(head="[T = Tilt axis angle = 85.3, binning = 1]"))
+    more = [] if words[0] == "info" else ["--thickness", 24]
+    refused = harness.tomofield(*words, "TS_01.mdoc", *more, cwd=folder)
+    assert refused.returncode == 2
+    expect(refused.stderr, "`tomofield reconstruct` and `align` begin with this axis if --align full")
+
+
+def test_a_pixel_size_of_1_A_is_not_taken_in_silence():
+    folder = write_series("one_angstrom")
+    path = os.path.join(folder, "TS_01.mrc")
+    harness.write_stack(path, bead_views(0, (56, 72)), 1.0)
+    said = dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt")
+    expect(said, "warning: 'TS_01.mrc' states pixels of 1 Å", "--pixel-size")
+    assert "--pixel-size" not in dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--pixel-size", 1)
+
+
 def test_a_series_of_relion_that_is_not_aligned_yet():
     folder = write_series("nominal", 85.3, stack="TS_01.mrcs")
     rows = "".join(f"{i + 1:06}@TS_01.mrcs {tilt:.2f} 85.3\n" for i, tilt in enumerate(TILTS))
@@ -294,7 +328,7 @@ def test_the_voltage_of_an_mdoc_counts():
     folder = write_series("voltage")
     write(folder, "TS_01.mdoc", mdoc_text(head="Voltage = 120\nImageFile = TS_01.mrc"))
     expect(dry(folder, "TS_01.mdoc", "--defocus", 3), "--voltage 120 from TS_01.mdoc: Voltage")
-    expect(dry(folder, "TS_01.mdoc", "--defocus", 3, "--voltage", 200), "not used: --voltage is given")
+    expect(dry(folder, "TS_01.mdoc", "--defocus", 3, "--voltage", 200), "not used: --voltage 200 is given")
     expect(dry(folder, "TS_01.mrc", "--mdoc", "TS_01.mdoc", "--defocus", 3),
            "voltage: 120 kV from 'TS_01.mdoc'")
     write(folder, "ctf.txt", "# acceleration voltage: 300.0 keV\n" + ctf_text([30000] * len(TILTS)))

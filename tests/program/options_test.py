@@ -44,8 +44,25 @@ def test_help_all_has_every_option_of_the_page():
     text = harness.succeed("reconstruct", "--help-all").stdout
     page = set(flags_of_keys().values())
     assert options_in(text) == page | COMMON | {"--trace", "--series", "--plan", "--choice",
-                                               "--grid"}, options_in(text) ^ (page | COMMON)
+                                               "--batch-choice", "--grid"}, options_in(text) ^ page
     assert max(map(len, text.splitlines())) <= 100
+
+
+def test_help_of_the_program_names_help_all():
+    for words in ([], ["--help"], ["--help-all"]):
+        text = harness.succeed(*words).stdout
+        assert "--help-all" in text and re.search(r"^  reconstruct ", text, re.MULTILINE), text
+        assert len(text.rstrip().splitlines()) <= 40, text
+
+
+def test_an_option_with_its_default_value_is_given():
+    series = harness.Series("given")
+    results = series.reconstruct("with_bin", *harness.QUICK, "--bin", 1)
+    with open(results.volume_path.replace(".mrc", "_report.html"), encoding="utf-8") as file:
+        report = file.read()
+    row = r"<td[^>]*>{}</td><td[^>]*>{}</td><td[^>]*>{}</td>"
+    assert re.search(row.format("--bin", "1", "given"), report)
+    assert re.search(row.format("--seed", "1", "default"), report)
 
 
 def test_help_of_baselines_has_their_own_options():

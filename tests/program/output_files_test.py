@@ -241,6 +241,29 @@ def test_a_run_of_too_few_views_for_trials_leaves_no_picture_of_earlier_trials(s
     assert not pictures & set(os.listdir(folder))
 
 
+def test_too_few_views_for_trials_are_said(series):
+    command = ["reconstruct", *series.input, "--thickness", harness.THICKNESS, "--contrast", "bright",
+               "--no-margin", "--dry-run"]
+    few = harness.succeed(*command, "--exclude", f"1-{len(harness.TILTS) - 11}")
+    assert "11 views are too few for trials, which leave some of them out and need 12" in few.stderr
+    enough = harness.succeed(*command, "--exclude", f"1-{len(harness.TILTS) - 12}")
+    assert "too few" not in enough.stderr and "short trials first" in enough.stdout
+    # Stages with the prior are of those who may have it.
+    assert "epochs: 80 of pixels 4 x 4, 80 of pixels 2 x 2, 10 at full resolution\n" in few.stdout
+    assert "5 at full resolution, 3 at full resolution\n" in enough.stdout
+
+
+def test_resume_is_offered_only_where_there_is_something_to_resume(series):
+    output = os.path.join(harness.fresh_directory("offered"), "out.mrc")
+    command = ["reconstruct", *series.input, *QUICK, "-o", output]
+    shutil.copy(series.tlt, output)  # a volume of somebody, without a model
+    refused = harness.tomofield(*command)
+    assert refused.returncode == 2 and "give --overwrite to replace it, or another" in refused.stderr
+    harness.succeed(*command, "--overwrite")
+    refused = harness.tomofield(*command)
+    assert refused.returncode == 2 and "--resume to continue the run that made it" in refused.stderr
+
+
 def test_a_run_that_overwrites_another_keeps_volumes_and_records(series):
     folder = harness.fresh_directory("overwritten_files")
     names = ("out_EVN_Vol.mrc", "out_tune.json", "out_align.xf", "out_alignment.json")

@@ -126,17 +126,22 @@ def test_options_and_configuration_files_win(series):
     results, printed = reconstruct("configured", folder, *REST, "--config", config, "--tilt-offset",
                                    0.25)
     assert results.volume.shape[0] == 16
-    assert re.search(r"--thickness 24 from .*THICKNESS \(not used: --thickness is", printed.stdout)
+    assert re.search(r"--thickness 24 from .*THICKNESS \(not used: --thickness 16 is given",
+                     printed.stdout)
     with open(results.json_path, encoding="utf-8") as file:
         options = json.load(file)["options"]["input"]
     assert options["tilt_offset_deg"] == 0.25 and options["log"] is False
-    used = {origin["option"] for origin in origins(results)}
-    assert used == {"stack", "--xf", "--tlt"}
+    instead = {origin["option"]: origin.get("instead") for origin in origins(results)}
+    assert instead == {"stack": None, "--xf": None, "--tlt": None, "--thickness": "--thickness 16",
+                       "--tilt-offset": "--tilt-offset 0.25"}
+    report = results.volume_path.replace(".mrc", "_report.html")
+    with open(report, encoding="utf-8") as file:
+        assert f"given, in place of 24 ({os.path.join(folder, 'tilt.com')}: THICKNESS)" in file.read()
     # --angpix takes the place of --bin.
     write_etomo(folder, series, "THICKNESS 24", "IMAGEBINNED 2")
     planned = harness.succeed("reconstruct", folder, *REST, "--angpix", PIXEL_SIZE, "--dry-run", "-o",
                               "never.mrc").stdout
-    assert "--bin 2" in planned and "(not used: --angpix is given)" in planned
+    assert "--bin 2" in planned and f"(not used: --angpix {PIXEL_SIZE} is given)" in planned
     assert f"tomogram {WIDTH} × {HEIGHT} × 24 voxels" in planned
 
 

@@ -60,7 +60,7 @@ def test_a_project_of_relion_is_reconstructed(series, plain, finished):
     result, output = finished
     for setting in ("rlnTomoTiltSeriesStarFile", "--pixel-size 13.37", "rlnTomoSizeZ"):
         assert setting in result.stdout, result.stdout
-    assert "rlnDefocusU (not used: --ctf is given)" in result.stdout, result.stdout
+    assert "rlnDefocusU (not used: --ctf none is given)" in result.stdout, result.stdout
     volume = harness.read_volume(output)
     assert volume.shape == (THICKNESS, HEIGHT, WIDTH)
     # The fill at the edges of shifted views and their interpolation cost a little.
@@ -80,7 +80,7 @@ def test_the_defocus_of_a_project_is_used(relion, finished):
     assert not np.array_equal(harness.read_volume(output), harness.read_volume(finished[1]))
     # One defocus in place of those of the table.
     result = harness.succeed(*command, "--defocus", 3, cwd=relion.folder)
-    assert "(not used: --defocus is given)" in result.stdout, result.stdout
+    assert "(not used: --defocus 3 is given)" in result.stdout, result.stdout
 
 
 def test_the_result_goes_back_to_relion(relion, finished):

@@ -43,6 +43,6 @@ def series(program, tmp_path_factory):
 @pytest.fixture
 def quick():
     """Returns options of a fit that takes a moment."""
-    return {"thickness": 16, "contrast": "bright", "leaf_size": 16, "rank": 4, "epochs": 3,
+    return {"thickness": 16, "contrast": "bright", "pixel_size_A": 10.0, "leaf_size": 16, "rank": 4, "epochs": 3,
             "coarse_epochs": 0, "vertex_epochs": 0, "penalty": "concave",
             "fit_view_scale": False}

@@ -73,15 +73,82 @@ def test_a_project_says_what_its_files_set(folder):
 
 def test_options_go_over_a_project(folder, tmp_path):
     tomofield.reconstruct(folder, output=tmp_path / "o.mrc", tilt_offset_deg=0.25, **QUICK)
-    record = tomofield.read_metrics(tmp_path / "o.mrc")
-    assert record["options"]["input"]["tilt_offset_deg"] == 0.25
-    used = {origin["option"] for origin in record["origins"]}
-    assert "--tilt-offset" not in used and "--thickness" in used
+    record = tomofield.read_record(tmp_path / "o.mrc")
+    assert record.options["input"]["tilt_offset_deg"] == 0.25
+    settings = {setting.option: setting for setting in record.settings}
+    assert settings["--tilt-offset"].value == "0.5"
+    assert settings["--tilt-offset"].instead == "--tilt-offset 0.25"
+    assert settings["--thickness"].instead == ""
+    report = (tmp_path / "o_report.html").read_text()
+    assert f"given, in place of 0.5 ({folder / 'tilt.com'}: OFFSET)" in report
 
 
 def test_a_stack_is_a_project_of_itself(series):
     project = tomofield.open_project(series.folder / "s.mrc")
     assert project.settings == [] and project.stack == series.folder / "s.mrc"
+
+
+def star(path, name, columns, rows):
+    """Writes a STAR file with one table."""
+    head = "".join(f"_{column} #{i}\n" for i, column in enumerate(columns, 1))
+    path.write_text(f"\ndata_{name}\n\nloop_\n{head}"
+                    + "".join(" ".join(map(str, row)) + "\n" for row in rows) + "\n")
+
+
+@pytest.fixture(scope="module")
+def tomograms(series, tmp_path_factory):
+    """Returns the tomograms.star of a RELION project with two series; the second is the first one
+    moved by four pixels."""
+    path = tmp_path_factory.mktemp("relion")
+    shutil.copy(series.folder / "s.mrc", path / "s.mrcs")
+    for name, shift_A in (("TS_01", 0), ("TS_02", 40)):
+        star(path / f"{name}.star", name,
+             ["rlnMicrographName", "rlnTomoXTilt", "rlnTomoYTilt", "rlnTomoZRot",
+              "rlnTomoXShiftAngst", "rlnTomoYShiftAngst"],
+             [[f"{i + 1:06d}@s.mrcs", 0, tilt, 0, 0, shift_A]
+              for i, tilt in enumerate(series.tilt_deg)])
+    star(path / "tomograms.star", "global",
+         ["rlnTomoName", "rlnTomoTiltSeriesStarFile", "rlnTomoTiltSeriesPixelSize", "rlnTomoSizeX",
+          "rlnTomoSizeY", "rlnTomoSizeZ"],
+         [[name, f"{name}.star", 10.0, 32, 32, 16] for name in ("TS_01", "TS_02")])
+    return path / "tomograms.star"
+
+
+def likeness(one, other):
+    return np.corrcoef(one.ravel(), other.ravel())[0, 1]
+
+
+def test_one_of_several_series_is_named_in_every_function(tomograms, tmp_path):
+    with pytest.raises(tomofield.Error, match="TS_01.*TS_02|--series"):
+        tomofield.reconstruct(tomograms, **QUICK)
+    project = tomofield.open_project(tomograms, series="TS_02")
+    assert {s.row for s in project.settings if s.option == "stack"} == {"TS_02"}
+    by_project = tomofield.reconstruct(project, **QUICK).tomogram
+    by_name = tomofield.reconstruct(tomograms, series="TS_02", **QUICK).tomogram
+    other = tomofield.reconstruct(tomograms, series="TS_01", **QUICK).tomogram
+    np.testing.assert_array_equal(by_name.values, by_project.values)
+    back = tomofield.baseline(tomograms, series="TS_02", contrast="bright", with_margin=False)
+    first = tomofield.baseline(tomograms, series="TS_01", contrast="bright", with_margin=False)
+    for moved, still in ((by_name, other), (back.tomogram, first.tomogram)):
+        assert likeness(moved[:, 4:24], still[:, 8:28]) > 0.97 > likeness(moved[:], still[:])
+    assert tomofield.align(tomograms, series="TS_01", output=tmp_path / "a.mrc", contrast="bright",
+                           with_margin=False)
+    assert (tmp_path / "a_align.xf").exists()
+
+
+def test_a_project_shows_its_settings_and_its_warnings(folder, caplog):
+    tilt_com = folder / "tilt.com"
+    entries = tilt_com.read_text()
+    try:
+        tilt_com.write_text(entries + "SOMETHINGNEW 3\n")
+        project = tomofield.open_project(folder)
+    finally:
+        tilt_com.write_text(entries)
+    assert len(project.warnings) == 1 and "SOMETHINGNEW" in project.warnings[0]
+    assert project.warnings[0] in [record.getMessage() for record in caplog.records]
+    shown = project._repr_html_()
+    assert "<td>--thickness</td><td>16</td>" in shown and "SOMETHINGNEW" in shown
+    assert tomofield.open_project(folder).warnings == []
 
 
 def test_projects_that_cannot_be_read_are_named(tmp_path):

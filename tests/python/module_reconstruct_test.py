@@ -19,13 +19,24 @@ import tomofield
 def test_arrays_with_the_defaults_give_the_bits_of_the_program(series):
     reports = []
     made = tomofield.reconstruct(series.views, series.tilt_deg, thickness=16, contrast="bright",
-                                 with_margin=False, progress=reports.append)
+                                 with_margin=False, pixel_size_A=10, progress=reports.append)
     assert made.is_finished
-    assert made.tomogram.dtype == np.float32
+    assert made.tomogram.values.dtype == np.float32
+    assert made.tomogram.voxel_size_A == 10
     np.testing.assert_array_equal(made.tomogram, series.tomogram)
     np.testing.assert_array_equal(made.model.sample(made.model.region()), series.tomogram)
     assert reports[-1].fraction_done == 1.0 and {r.is_trial for r in reports} == {True, False}
-    assert made.metrics["options"]["fit"] == read_json(series, "tomogram.json")["options"]["fit"]
+    written = tomofield.read_record(series.folder / "tomogram.mrc")
+    assert made.options["fit"] == written.options["fit"]
+    assert made.verdict.startswith("verdict: residual") and isinstance(made.warnings, list)
+
+
+def test_metrics_are_not_nested(series):
+    written = read_json(series, "tomogram.json")
+    record = tomofield.read_record(series.folder / "tomogram.mrc")
+    assert record.metrics == written["metrics"] and record.options == written["options"]
+    assert record.metrics["verdict"]["line"] == record.verdict
+    assert tomofield.read_metrics(series.folder / "tomogram.json") == record.metrics
 
 
 def test_files_with_the_defaults_give_the_bytes_of_the_program(series, tmp_path):
@@ -34,8 +45,7 @@ def test_files_with_the_defaults_give_the_bytes_of_the_program(series, tmp_path)
                                  output=tmp_path / "t.mrc")
     assert made.tomogram is None
     assert (tmp_path / "t.mrc").read_bytes() == (series.folder / "tomogram.mrc").read_bytes()
-    assert made.metrics == tomofield.read_metrics(tmp_path / "t.mrc")
-    assert made.metrics == tomofield.read_metrics(tmp_path / "t.json")
+    assert made.record == tomofield.read_record(tmp_path / "t.mrc")
     assert sorted(os.listdir(tmp_path)) == [
         "t.h5", "t.json", "t.mrc", "t_choice.png", "t_denoise.png", "t_mask.png", "t_prior.png",
         "t_report.html", "t_xy.png", "t_xz.png", "t_yz.png"]
@@ -58,6 +68,7 @@ def test_the_callback_stops_it_and_resume_goes_on(series, quick, tmp_path):
                                     progress=lambda p: p.fraction_done < 0.5)
     assert not stopped.is_finished
     assert (stopped.tomogram, stopped.model, stopped.metrics) == (None, None, {})
+    assert "stopped" in stopped._repr_html_()
     output = tmp_path / "t.mrc"
     assert not tomofield.reconstruct(series.views, series.tilt_deg, **quick, output=output,
                                      progress=lambda p: False).is_finished
@@ -72,6 +83,20 @@ def test_an_exception_of_the_callback_comes_back(series, quick):
         raise ZeroDivisionError("of the callback")
     with pytest.raises(ZeroDivisionError, match="of the callback"):
         tomofield.reconstruct(series.views, series.tilt_deg, **quick, progress=fail)
+
+
+def test_an_exception_of_the_callback_leaves_a_checkpoint(series, quick, tmp_path):
+    def fail(progress):
+        if progress.fraction_done > 0.3:
+            raise ZeroDivisionError("of the callback")
+    output = tmp_path / "t.mrc"
+    with pytest.raises(ZeroDivisionError, match="of the callback"):
+        tomofield.reconstruct(series.views, series.tilt_deg, **quick, progress=fail, output=output)
+    assert (tmp_path / "t.h5").exists() and not output.exists()
+    first = []
+    made = tomofield.reconstruct(series.views, series.tilt_deg, **quick, output=output, resume=True,
+                                 progress=first.append)
+    assert made.is_finished and first[0].fraction_done > 0.3
 
 
 def test_ctrl_c_stops_it_and_leaves_a_checkpoint(series, quick, tmp_path):
@@ -151,15 +176,21 @@ def test_bad_input_is_refused_in_a_sentence(series, quick):
         tomofield.reconstruct(views, tilts[:-1], **quick)
     for wrong in (series.views + 1j, series.views.astype(str), series.views.astype("M8[s]")):
         with pytest.raises(tomofield.Error, match="real numbers"):
-            tomofield.reconstruct(wrong, series.tilt_deg, thickness=16)
+            tomofield.reconstruct(wrong, series.tilt_deg, **quick)
     for tilt in (np.nan, np.inf):
-        with pytest.raises(tomofield.Error, match="tilt angle"):
-            tomofield.reconstruct(series.views, [tilt, *list(series.tilt_deg)[1:]], thickness=16,
-                                  contrast="bright")
+        with pytest.raises(tomofield.Error, match="tilt angles of views in memory': the tilt angle "
+                                                  "of section 1 is not a finite number"):
+            tomofield.reconstruct(series.views, [tilt, *list(series.tilt_deg)[1:]], **quick)
+    with pytest.raises(tomofield.Error, match="tilt angle 85° of section 1 is beyond"):
+        tomofield.reconstruct(series.views, [85, *list(series.tilt_deg)[1:]], **quick)
     with pytest.raises(tomofield.Error, match="2 dimensions"):
         tomofield.reconstruct(views[0], tilts, **quick)
     with pytest.raises(tomofield.Error, match="tilt_deg"):
         tomofield.reconstruct(views, **quick)
+    with pytest.raises(tomofield.Error, match="need pixel_size_A"):
+        tomofield.reconstruct(views, tilts, **{**quick, "pixel_size_A": None})
+    with pytest.raises(tomofield.Error, match="series names one"):
+        tomofield.reconstruct(views, tilts, **quick, series="TS_01")
     with pytest.raises(tomofield.Error, match="xf"):
         tomofield.reconstruct(views, tilts, xf="a.xf", **quick)
     with pytest.raises(tomofield.Error, match="thickness"):
@@ -195,7 +226,7 @@ def test_every_row_of_the_option_table_is_a_keyword():
 def test_options_keep_what_they_are_set_to():
     values = {"contrast": "bright", "penalty": "smooth", "roi": (1, 2, 3, 4), "leaf_size": 64,
               "voxel_type": "int16", "seed": 2**63 + 1, "take_log": True, "exclude": "1-3"}
-    core = tomofield._chosen(tomofield._core.Choices(), values)
+    core = tomofield._projects.chosen(tomofield._core.Choices(), values)
     for name, value in values.items():
         found = getattr(core, name)
         assert (tuple(found) if name == "roi" else found) == value
@@ -205,7 +236,7 @@ def test_options_keep_what_they_are_set_to():
 
 @pytest.mark.parametrize("work", [
     "tomofield.reconstruct(views, tilts, epochs=1000, thickness=16, contrast='bright', "
-    "density_variation=1.0, prior='tv')",
+    "pixel_size_A=10, density_variation=1.0, prior='tv')",
     "[tomofield.score_volume(views, views) for _ in iter(int, 1)]"])
 def test_the_interpreter_ends_in_order_beside_a_daemon_thread(work):
     script = f"""

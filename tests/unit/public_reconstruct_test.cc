@@ -156,6 +156,27 @@ TEST(PublicReconstruct, TheCallbackStopsARunWhichResumes) {
   EXPECT_EQ(read_volume(options.run.output), whole);
 }
 
+TEST(PublicReconstruct, AnExceptionOfTheCallbackLeavesACheckpoint) {
+  const ScratchDirectory scratch;
+  const TiltSeries series = TiltSeries::from_images(spheres());
+  Options options = quick_options();
+  options.run.output = scratch / "tomogram.mrc";
+  int calls_after = 0;
+  const auto fail = [&, has_failed = false](const Progress& progress) mutable {
+    calls_after += has_failed ? 1 : 0;
+    if (progress.fraction_done < 0.5) return true;
+    has_failed = true;
+    throw std::domain_error("of the callback");
+  };
+  EXPECT_EQ(message_of<std::domain_error>([&] { reconstruct(series, options, fail); }),
+            "of the callback");
+  EXPECT_EQ(calls_after, 0);
+  EXPECT_TRUE(std::filesystem::exists(scratch / "tomogram.h5"));
+  EXPECT_FALSE(std::filesystem::exists(scratch / "tomogram.mrc"));
+  options.run.resume = true;
+  EXPECT_TRUE(reconstruct(series, options).is_finished);
+}
+
 TEST(PublicReconstruct, AStopAtTheEndOfTheFitOfAllDataComesInTheFirstHalf) {
   const ScratchDirectory scratch;
   const TiltSeries series = TiltSeries::from_images(spheres());
@@ -259,6 +280,12 @@ TEST(PublicReconstruct, RefusesWhatCannotBeUsed) {
   Options options = quick_options();
   options.specimen.thickness = 0;
   EXPECT_NE(refusal(options).find("thickness"), std::string::npos);
+  ViewImages of_unknown_size = spheres();
+  of_unknown_size.pixel_size_A = 0;
+  EXPECT_NE(message_of<Error>([&] {
+              reconstruct(TiltSeries::from_images(of_unknown_size), quick_options());
+            }).find("have no pixel size: give it in Å with --pixel-size"),
+            std::string::npos);
   options = quick_options();
   options.run.resume = true;
   EXPECT_NE(refusal(options).find("resume"), std::string::npos);

@@ -8,6 +8,7 @@
 #include "cli/options/help_formatter.h"
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
+#include "option_table/rows.h"
 #include "option_table/setting.h"
 #include "options/run_options.h"
 #include "reconstruct/reconstruct.h"
@@ -17,8 +18,9 @@ namespace {
 
 using option_table::Group;
 
-void run(option_table::Choices& choices, const std::vector<Setting>& origins) {
-  option_table::note_settings(origins, choices);
+void run(const CLI::App& command, option_table::Choices& choices,
+         const std::vector<Setting>& origins) {
+  note_origins(command, origins, choices);
   options::ReconstructOptions options = options::run_options(choices.files, choices.options);
   stop_on_signals(false);
   const auto& alone = distributed::Communicator::alone();
@@ -52,7 +54,7 @@ void add_align_command(CLI::App& program, const std::vector<Setting>& origins) {
       "Example: tomofield align series.mrc --tlt series.tlt --align full --thickness 1200 \\\n"
       "           -o series.mrc\nThe files are called after the output: series_align.xf, .tlt, "
       ".aln, .json and .png");
-  command.callback([choices, &origins] { run(*choices, origins); });
+  command.callback([&command, choices, &origins] { run(command, *choices, origins); });
 }
 
 }  // namespace tomofield::cli

@@ -79,8 +79,7 @@ void print_summary(const baseline::BaselineSummary& summary) {
 // Checks the views and prints what a baseline would do.
 void rehearse(const baseline::BaselineOptions& options, const baseline::MethodFacts& method,
               const DryRun& dry_run) {
-  const tilt_series::MeasuredSeries series(
-      tilt_series::series_options(options.files, options.shared));
+  const tilt_series::MeasuredSeries series(options.input());
   const Sizes sizes = print_plan(baseline::plan_baseline(series, options), options, method);
   if (dry_run.grid) write_grid(*dry_run.grid, sizes);
 }
@@ -88,7 +87,7 @@ void rehearse(const baseline::BaselineOptions& options, const baseline::MethodFa
 // Runs a baseline whose options have been checked.
 void run_method(const baseline::BaselineOptions& options, const baseline::MethodFacts& method,
                 const output::OutputPaths& paths) {
-  const tilt_series::TiltSeries series(tilt_series::series_options(options.files, options.shared));
+  const tilt_series::TiltSeries series(options.input());
   print_plan(baseline::plan_baseline(series, options), options, method);
   io::OutputSet results;
   const baseline::BaselineSummary summary = baseline::run_baseline(
@@ -102,14 +101,15 @@ void run_method(const baseline::BaselineOptions& options, const baseline::Method
 }
 
 template <typename Method>
-void run(BaselineArguments<Method>& arguments, const Origins& origins) {
-  option_table::note_settings(origins, arguments.choices);
+void run(const CLI::App& command, BaselineArguments<Method>& arguments, const Origins& origins) {
+  note_origins(command, origins, arguments.choices);
   const Options& shared = arguments.choices.options;
+  if (shared.run.output.empty()) throw Error("-o '' names no file: name the tomogram");
   Method& method = arguments.method;
   if constexpr (requires { method.non_negative; })
     method.non_negative = arguments.non_negative.value_or(shared.views.contrast != Contrast::kDark);
-  const baseline::BaselineOptions options{arguments.choices.files, shared, method,
-                                          arguments.ctf_correction};
+  const baseline::BaselineOptions options{
+      arguments.choices.files, shared, method, arguments.ctf_correction, {}};
   const output::OutputPaths paths = output::output_paths(shared.run.output);
   const auto check_trace = [&] {
     check_trace_file(arguments.trace, {paths.volume, paths.json}, options.files,
@@ -179,7 +179,7 @@ std::shared_ptr<BaselineArguments<Method>> add_method(CLI::App& command, const O
   add_common_options(command);
   add_trace_option(command, arguments->trace);
   add_help_all(command);
-  command.callback([arguments, &origins] { run(*arguments, origins); });
+  command.callback([&command, arguments, &origins] { run(command, *arguments, origins); });
   return arguments;
 }
 

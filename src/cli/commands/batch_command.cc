@@ -54,7 +54,7 @@ struct BatchArguments {
 // Says what a table may do with an option of reconstruct.
 batch::ColumnKind kind_of_column(const CLI::App& reconstruct, const std::string& flag) {
   for (const char* own : {"--output", "--overwrite", "--resume", "--threads", "--dry-run", "--plan",
-                          "--choice", "--trace", "--help", "--help-all"})
+                          "--choice", "--batch-choice", "--trace", "--help", "--help-all"})
     if (flag == own) return batch::ColumnKind::kNotHere;
   const CLI::Option* option = reconstruct.get_option_no_throw(flag);
   if (option == nullptr) return batch::ColumnKind::kUnknown;
@@ -234,7 +234,7 @@ void run(const CLI::App& command, const BatchArguments& arguments,
   print_choosing(list, choice);
   if (arguments.dry_run) return;
   if (choice.stored)
-    give_choice(*choice.stored, list.jobs);
+    give_choice(*choice.stored, options.folder, list.jobs);
   else if (arguments.choose == batch::Choose::kOnce || !options.skips_existing)
     batch::forget_choice(options.folder);
   begin_batch(options.folder, list);

@@ -1,9 +1,13 @@
 #include "cli/commands/choice_file.h"
 
+#include <algorithm>
+#include <string>
+
+#include "batch/begun_settings.h"
 #include "cli/commands/run_reconstruction.h"
+#include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
-#include "io/json.h"
 #include "reconstruct/reconstruct.h"
 
 namespace tomofield::cli {
@@ -17,14 +21,31 @@ void add_choice_option(CLI::App& command, std::optional<std::filesystem::path>& 
       ->group(kHelpAllGroup);
 }
 
+void add_batch_choice_option(CLI::App& command, std::optional<std::filesystem::path>& file) {
+  command
+      .add_option("--batch-choice", file,
+                  "The choice of a batch, which --tv-penalty, --tv, --spike-rank and --prior come "
+                  "from: the report says so")
+      ->type_name("FILE.json")
+      ->group(kHelpAllGroup);
+}
+
+void add_settings_of_batch(const CLI::App& command, const std::filesystem::path& file,
+                           std::vector<Setting>& settings) {
+  for (const option_table::GivenOption& given : given_options(command, {})) {
+    if (!given.value || !batch::is_shared(given.flag)) continue;
+    settings.push_back({.option = given.flag,
+                        .value = *given.value,
+                        .file = file,
+                        .entry = "choice for all series of the batch"});
+  }
+}
+
 void write_choice(const std::filesystem::path& file, const options::ReconstructOptions& options,
                   const distributed::Communicator& processes) {
   stop_on_signals(processes.size() > 1);
-  const auto choice = reconstruction::choose(options, terminal_observer(processes), processes);
-  if (!choice) throw ExitStatus{stop_status(), "stopped during the trials"};
-  processes.run_collectively([&] {
-    if (processes.is_root()) io::write_json(file, *choice);
-  });
+  if (!reconstruction::choose(file, options, terminal_observer(processes), processes))
+    throw ExitStatus{stop_status(), "stopped during the trials"};
   if (processes.is_root()) print("choice    {}\n", file.string());
 }
 

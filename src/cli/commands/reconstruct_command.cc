@@ -25,6 +25,7 @@ struct ReconstructArguments {
   option_table::Choices choices;
   DryRun dry_run;
   std::optional<std::filesystem::path> trace, plan, choice;
+  std::optional<std::filesystem::path> batch_choice;
 };
 
 // Gives the tomogram of a dry run a name, which is needed and not written.
@@ -36,10 +37,11 @@ void require_output(RunOptions& run, bool dry_run) {
   run.overwrite = true;
 }
 
-void run(ReconstructArguments& arguments, const distributed::Communicator& processes,
-         const std::vector<Setting>& origins) {
+void run(const CLI::App& command, ReconstructArguments& arguments,
+         const distributed::Communicator& processes, std::vector<Setting> origins) {
   require_output(arguments.choices.options.run, arguments.dry_run.is_wanted);
-  option_table::note_settings(origins, arguments.choices);
+  if (arguments.batch_choice) add_settings_of_batch(command, *arguments.batch_choice, origins);
+  note_origins(command, origins, arguments.choices);
   options::ReconstructOptions options =
       options::run_options(arguments.choices.files, arguments.choices.options);
   processes.run_collectively([&] {
@@ -74,12 +76,15 @@ void add_reconstruct_command(CLI::App& program, const distributed::Communicator&
   add_trace_option(command, arguments->trace);
   add_plan_option(command, arguments->plan);
   add_choice_option(command, arguments->choice);
+  add_batch_choice_option(command, arguments->batch_choice);
   add_groups(command, arguments->choices, {Group::kResearch});
   add_help_all(command);
   command.footer(
       "Example: tomofield reconstruct series.mrc --tlt series.tlt --xf series.xf --bin 4 \\\n"
       "           --thickness 1200 -o tomogram.mrc");
-  command.callback([arguments, &processes, &origins] { run(*arguments, processes, origins); });
+  command.callback([&command, arguments, &processes, &origins] {
+    run(command, *arguments, processes, origins);
+  });
 }
 
 }  // namespace tomofield::cli

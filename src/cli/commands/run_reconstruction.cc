@@ -152,7 +152,7 @@ void print_results(const reconstruction::RunResult& run, const options::Reconstr
   if (options.field.tree == TreeKind::kAdaptive)
     print("tree      {}\n", paths.tree_picture.string());
   flush_output();  // the verdict comes last
-  verdict::log_verdict(run.verdict);
+  verdict::log_verdict(run.record.fit.verdict);
 }
 
 }  // namespace

@@ -40,8 +40,9 @@ int size_of_node(const options::ReconstructOptions& options) {
   return baseline::one_node_size(tilt_series::PlannedSeries(options.input()), options);
 }
 
-void run(TensorfArguments& arguments, const std::vector<Setting>& origins) {
-  option_table::note_settings(origins, arguments.choices);
+void run(const CLI::App& command, TensorfArguments& arguments,
+         const std::vector<Setting>& origins) {
+  note_origins(command, origins, arguments.choices);
   Options& requested = arguments.choices.options;
   if (arguments.non_negative)
     requested.field.activation =
@@ -73,7 +74,7 @@ void add_tensorf(CLI::App& baseline, const std::vector<Setting>& origins) {
   add_common_options(command);
   add_trace_option(command, arguments->trace);
   add_help_all(command);
-  command.callback([arguments, &origins] { run(*arguments, origins); });
+  command.callback([&command, arguments, &origins] { run(command, *arguments, origins); });
 }
 
 }  // namespace tomofield::cli

@@ -117,8 +117,14 @@ std::string HelpFormatter::make_help(const CLI::App* command, std::string name,
     }
     if (!lines.empty()) help += "\n" + title + ":\n" + lines;
   };
+  const auto add_subcommands = [&] {
+    const std::vector<const CLI::App*> commands = command->get_subcommands(nullptr);
+    if (!commands.empty()) help += "\nSubcommands:\n";
+    for (const CLI::App* sub : commands) help += make_subcommand(sub);
+  };
   if (is_short) {  // one screen
     add_section("Options", [](const CLI::Option& option) { return !option.get_group().empty(); });
+    add_subcommands();
     return help;
   }
   add_section("Arguments", [](const CLI::Option& option) { return option.get_positional(); });
@@ -128,9 +134,7 @@ std::string HelpFormatter::make_help(const CLI::App* command, std::string name,
       return !option.get_positional() && option.get_group() == group;
     });
   }
-  const std::vector<const CLI::App*> commands = command->get_subcommands(nullptr);
-  if (!commands.empty()) help += "\nSubcommands:\n";
-  for (const CLI::App* sub : commands) help += make_subcommand(sub);
+  add_subcommands();
   return help;
 }
 

@@ -65,8 +65,8 @@ std::string word_of(const CLI::Option& option, const Setting& setting) {
   return is_flag ? setting.option : fmt::format("{}={}", setting.option, setting.value);
 }
 
-// Returns the option among the user's arguments that stands in place of a setting, or an empty
-// text.
+// Returns what holds in place of a setting among the user's arguments, as in "--thickness 200", or
+// an empty text.
 std::string winner_over(const Setting& setting, const CLI::App& command, const Words& given) {
   // A user gives one option of each pair.
   constexpr std::pair<std::string_view, std::string_view> kRivals[] = {{"--bin", "--angpix"},
@@ -74,7 +74,11 @@ std::string winner_over(const Setting& setting, const CLI::App& command, const W
                                                                        {"--xf", "--aln"},
                                                                        {"--aln", "--xf"},
                                                                        {"--ctf", "--defocus"}};
-  if (is_given(*command.get_option(setting.option), given)) return setting.option;
+  const auto with_value = [&](const std::string& flag) {
+    const std::string value = value_of(flag, given);
+    return value.empty() ? flag : fmt::format("{} {}", flag, value);
+  };
+  if (is_given(*command.get_option(setting.option), given)) return with_value(setting.option);
   const bool is_of_intensities = setting.option == "--log" || setting.option == "--log-base";
   if (is_of_intensities && value_of("--contrast", given) == "bright") return "--contrast bright";
   constexpr std::array<std::string_view, 6> kOfTransfer{
@@ -83,7 +87,7 @@ std::string winner_over(const Setting& setting, const CLI::App& command, const W
   if (is_transfer && value_of("--engine", given) == "ray") return "--engine ray";
   for (const auto& [option, rival] : kRivals) {
     if (option == setting.option && is_given(*command.get_option(std::string(rival)), given))
-      return std::string(rival);
+      return with_value(std::string(rival));
   }
   return {};
 }
@@ -119,26 +123,27 @@ std::vector<Setting> expand_project(const CLI::App& program, Words& arguments) {
   if (!project) return {};
   for (const auto& file : project->files()) io::add_input(file);
   const Words given = arguments;
-  std::vector<Setting> used;
-  for (const Setting& setting : project->settings()) {
+  std::vector<Setting> noted;
+  for (Setting setting : project->settings()) {
     const CLI::Option* option = command.get_option_no_throw(setting.option);
     if (option == nullptr) {
       print_setting(setting, " (not an option of this command)");
     } else if (option->get_positional()) {
       *find_stack(command, arguments) = setting.value;
       print_setting(setting, "");
-      used.push_back(setting);
-    } else if (const std::string winner = winner_over(setting, command, given); !winner.empty()) {
-      print_setting(setting, fmt::format(" (not used: {} is given)", winner));
+      noted.push_back(setting);
+    } else if (setting.instead = winner_over(setting, command, given); !setting.instead.empty()) {
+      print_setting(setting, fmt::format(" (not used: {} is given)", setting.instead));
+      noted.push_back(setting);
     } else {
       arguments.push_back(word_of(*option, setting));
       print_setting(setting, "");
-      used.push_back(setting);
+      noted.push_back(setting);
     }
   }
   flush_output();  // settings come before other output, in a file too
   for (const std::string& warning : project->warnings()) base::log_warning(warning);
-  return used;
+  return noted;
 }
 
 }  // namespace tomofield::cli

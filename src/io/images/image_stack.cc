@@ -32,7 +32,8 @@ class MemoryStack : public ImageStack {
   MemoryStack(std::vector<float> values, MrcHeader header)
       : values_(std::move(values)), header_(std::move(header)) {}
   const MrcHeader& header() const override { return header_; }
-  std::string name() const override { return "images in memory"; }
+  std::string name() const override { return "views in memory"; }
+  bool is_in_memory() const override { return true; }
   void read_section(std::int64_t section, std::span<float> out) const override {
     const auto size = static_cast<std::size_t>(header_.nx * header_.ny);
     std::ranges::copy(std::span(values_).subspan(static_cast<std::size_t>(section) * size, size),

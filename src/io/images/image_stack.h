@@ -22,6 +22,8 @@ class ImageStack {
   virtual const MrcHeader& header() const = 0;
   /// Returns what messages call the stack: its path, or a description.
   virtual std::string name() const = 0;
+  /// Tells whether the images are in memory, which a user of the library gave, and not in a file.
+  virtual bool is_in_memory() const { return false; }
   /// Copies section `section` into `out`, ny × nx floats.
   virtual void read_section(std::int64_t section, std::span<float> out) const = 0;
 };
@@ -43,7 +45,7 @@ std::shared_ptr<const ImageStack> image_stack_of_files(const std::vector<ImageIn
                                                        std::string name);
 
 /// Wraps images [section, y, x], x fastest, with an angle a section (degrees about +Y) and the
-/// pixel size in Å. Throws Error if the sizes do not agree.
+/// pixel size in Å, or 0 if it is not known. Throws Error if the sizes do not agree.
 std::shared_ptr<const ImageStack> image_stack_in_memory(std::vector<float> values,
                                                         std::int64_t width, std::int64_t height,
                                                         std::vector<double> tilt_deg,

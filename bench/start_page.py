@@ -1,0 +1,40 @@
+"""Knows the commands and pictures of docs/start.md: runs its commands in folders that
+bench/start_folders.py makes, and takes the pictures from what they write."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+
+import readme_page
+import start_folders
+
+PAGE = os.path.join(readme_page.PROJECT, "docs", "start.md")
+SIZE = 128  # pixels of a view, for the pictures
+
+
+def commands(text=None):
+    """Returns the words of every `tomofield …` in the blocks of the page."""
+    text = readme_page.read(PAGE) if text is None else text
+    blocks = re.findall(r"^```sh\n(.*?)^```$", text, re.M | re.S)
+    return [shlex.split(line)[1:] for block in blocks for line in block.splitlines()
+            if line.startswith("tomofield ")]
+
+
+def pictures(text=None):
+    """Returns {picture of the page: the file that a command writes}, by the name of its results."""
+    text = readme_page.read(PAGE) if text is None else text
+    return {f"docs/{path}": f"{name}_xy.png"
+            for path, name in re.findall(r"\]\((results/start_(\w+)\.png)\)", text)}
+
+
+def make(program, folder):
+    """Runs all commands, and copies their pictures into docs/. Returns the paths of these."""
+    start_folders.make_folders(program, folder, SIZE)
+    for words in commands():
+        more = ["--overwrite"] if "-o" in words else []
+        subprocess.run([os.path.abspath(program), *words, *more], cwd=folder, check=True)
+    for picture, made in pictures().items():
+        shutil.copy(os.path.join(folder, made), os.path.join(readme_page.PROJECT, picture))
+    return list(pictures())

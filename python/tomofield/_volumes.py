@@ -1,0 +1,203 @@
+"""Volumes in memory and on disk, models, and boxes of them."""
+
+import os
+from dataclasses import dataclass
+from typing import Any, Literal, Optional, Tuple, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core, _pictures
+from ._core import Error
+
+Path = Union[str, "os.PathLike[str]"]
+Array = npt.NDArray[np.float32]
+Numbers = Tuple[float, float, float]
+Axis = Literal["x", "y", "z"]
+
+
+@dataclass(frozen=True, eq=False)
+class Tomogram:
+    """A volume in memory. numpy takes it for its array: np.mean(tomogram), tomogram[8].
+
+    values: array [z, y, x], float32, in the units and the contrast of the tilt series.
+    voxel_size_A: side of a voxel in Å.
+    """
+
+    values: Array
+    voxel_size_A: float
+
+    def __array__(self, dtype: Optional[npt.DTypeLike] = None) -> npt.NDArray[Any]:
+        return np.asarray(self.values, dtype=dtype)
+
+    def __getitem__(self, key: Any) -> Any:
+        return self.values[key]
+
+    def __repr__(self) -> str:
+        return f"<Tomogram of {self._size()}>"
+
+    @property
+    def shape(self) -> Tuple[int, ...]:
+        """Numbers of voxels along z, y and x."""
+        return self.values.shape
+
+    def section(self, axis: Axis = "z", index: Optional[int] = None) -> Array:
+        """Return a section across an axis, by default the one in the middle: [y, x], [z, x] across
+        y, [z, y] across x."""
+        along = _axis_number(axis)
+        at = self.shape[along] // 2 if index is None else index
+        return np.asarray(np.take(self.values, at, axis=along), np.float32)
+
+    def write(self, path: Path, *, overwrite: bool = False) -> None:
+        """Write an MRC file of 32-bit floats."""
+        write_mrc(path, self, overwrite=overwrite)
+
+    def _size(self) -> str:
+        sides = " × ".join(str(side) for side in reversed(self.shape))
+        return f"{sides} voxels (x, y, z) of {self.voxel_size_A:.4g} Å"
+
+    def _repr_html_(self) -> str:
+        caption = f"Tomogram of {self._size()}: the middle XY section"
+        return _pictures.figure(self.section(), caption)
+
+
+@dataclass(frozen=True)
+class Box:
+    """Cubic voxels anywhere in a model. A tilted plane is a box with one voxel in z.
+
+    centre_px: x, y, z of the box's geometric centre, in pixels of the model: of the aligned, binned
+        view at zero tilt, whose pixel i covers [i, i + 1); z runs from 0 to the thickness.
+    size: voxels in x, y, z.
+    voxel_px: side of a voxel in pixels.
+    euler_deg: rot, tilt, psi as RELION's rlnAngleRot, rlnAngleTilt and rlnAnglePsi.
+    """
+
+    centre_px: Numbers
+    size: Tuple[int, int, int]
+    voxel_px: float = 1.0
+    euler_deg: Numbers = (0.0, 0.0, 0.0)
+
+
+class Model:
+    """A density field that reconstruct() fitted, or that a model file (.h5) holds.
+
+    Values are in the units and the contrast of the tilt series, and 0 outside of the model.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Read a model file."""
+        self._core = _core.Model(os.fspath(path))
+
+    @classmethod
+    def _of(cls, core: _core.Model) -> "Model":
+        model = cls.__new__(cls)
+        model._core = core
+        return model
+
+    def __repr__(self) -> str:
+        return f"<Model of {self._size()}>"
+
+    @property
+    def pixel_size_A(self) -> float:
+        """Size in Å of the pixels that positions count."""
+        return self._core.pixel_size_A()
+
+    def region(self, voxel_px: float = 1.0) -> Box:
+        """Return the region of interest, in whole voxels of voxel_px pixels."""
+        box = self._core.region(voxel_px)
+        return _box_of(box)
+
+    def sample(self, box: Box) -> Array:
+        """Return the values of a box as an array [z, y, x]."""
+        return self._core.sample(_core_box(box))
+
+    def sample_points(self, points: npt.ArrayLike) -> Array:
+        """Return the value at each of N points, given as N rows of x, y, z in pixels."""
+        return self._core.sample_points(points)
+
+    def tomogram(self, voxel_size_A: Optional[float] = None) -> Tomogram:
+        """Return the region of interest as a volume, by default with a voxel a pixel."""
+        box = self._region_of(voxel_size_A)
+        return Tomogram(self.sample(box), box.voxel_px * self.pixel_size_A)
+
+    def _region_of(self, voxel_size_A: Optional[float]) -> Box:
+        return self.region(1.0 if voxel_size_A is None else voxel_size_A / self.pixel_size_A)
+
+    def _size(self) -> str:
+        sides = " × ".join(str(side) for side in self.region().size)
+        return f"{sides} pixels (x, y, z) of {self.pixel_size_A:.4g} Å"
+
+    def _repr_html_(self) -> str:
+        region = self.region()
+        step = max(1.0, max(region.size[:2]) / _pictures.LARGEST)
+        width, height = (max(1, int(side / step)) for side in region.size[:2])
+        x, y, z = region.centre_px
+        middle = z + (0.5 if region.size[2] % 2 == 0 else 0.0)  # as Tomogram.section()
+        plane = Box((x, y, middle), (width, height, 1), step, region.euler_deg)
+        return _pictures.figure(self.sample(plane)[0],
+                                f"Model of {self._size()}: the middle XY section")
+
+
+def export(model: Union[Model, Path], output: Path, *, box: Optional[Box] = None,
+           voxel_size_A: Optional[float] = None,
+           voxel_type: Literal["float32", "float16", "int16"] = "float32",
+           axes: Literal["xyz", "xzy"] = "xyz", invert: bool = False, zarr: bool = False,
+           overwrite: bool = False) -> None:
+    """Write a box of a model as an MRC volume, as `tomofield export` does.
+
+    model: a model, or the path of its file.
+    output: the volume to write, NAME.mrc.
+    box: any box; by default the region of interest with voxels of voxel_size_A.
+    voxel_size_A: side of its voxels in Å; by default that of the model's pixels.
+    voxel_type, axes, invert, zarr, overwrite: as in tomofield.Options.
+    """
+    if not isinstance(model, Model):
+        model = Model(model)
+    if box is not None and voxel_size_A is not None:
+        raise Error("box states the size of its voxels (voxel_px): leave voxel_size_A out")
+    choices = _core.Choices()
+    for name, value in (("voxel_type", voxel_type), ("axes", axes), ("invert", invert),
+                        ("zarr", zarr), ("overwrite", overwrite)):
+        setattr(choices, name, value)
+    chosen = model._region_of(voxel_size_A) if box is None else box
+    _core.export_box(model._core, _core_box(chosen), os.fspath(output), choices)
+
+
+def read_mrc(path: Path) -> Tomogram:
+    """Return the values of an MRC file: a volume, or a tilt series as [view, y, x]. The size of a
+    voxel is 0 if the file does not state it."""
+    return Tomogram(*_core.read_mrc(os.fspath(path)))
+
+
+def write_mrc(path: Path, volume: npt.ArrayLike, voxel_size_A: Optional[float] = None, *,
+              overwrite: bool = False) -> None:
+    """Write a Tomogram, or an array [z, y, x], as an MRC file of 32-bit floats.
+
+    voxel_size_A: side of a voxel in Å, which an array needs and a Tomogram has.
+    """
+    _core.write_mrc(volume, _voxel_size(voxel_size_A, volume), os.fspath(path), overwrite)
+
+
+def _voxel_size(given: Optional[float], *volumes: Any) -> float:
+    """Return the size of a voxel: the one that is given, or that of the first Tomogram."""
+    if given is not None:
+        return given
+    for volume in volumes:
+        if isinstance(volume, Tomogram):
+            return volume.voxel_size_A
+    raise Error("an array does not say how large its voxels are: give voxel_size_A, in Å")
+
+
+def _axis_number(axis: str) -> int:
+    if axis not in ("z", "y", "x"):
+        raise Error(f"an axis is one of 'x', 'y', 'z', not {axis!r}")
+    return "zyx".index(axis)
+
+
+def _box_of(core: _core.SampleBox) -> Box:
+    (x, y, z), (nx, ny, nz), (rot, tilt, psi) = core.centre_px, core.size, core.euler_deg
+    return Box((x, y, z), (nx, ny, nz), core.voxel_px, (rot, tilt, psi))
+
+
+def _core_box(box: Box) -> _core.SampleBox:
+    return _core.SampleBox(box.centre_px, box.size, box.voxel_px, box.euler_deg)

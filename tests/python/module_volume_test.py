@@ -1,0 +1,172 @@
+"""Tomograms in memory: numpy, sections, pictures for notebooks, files, and other methods."""
+
+import base64
+import io
+import re
+
+import mrcfile
+import numpy as np
+import pytest
+from PIL import Image
+
+import tomofield
+
+
+@pytest.fixture(scope="module")
+def made(series):
+    return tomofield.reconstruct(series.folder / "s.mrc", tlt=series.folder / "s.tlt", thickness=16,
+                                 contrast="bright", with_margin=False)
+
+
+@pytest.fixture
+def options(series):
+    return {"tlt": series.folder / "s.tlt", "thickness": 16, "contrast": "bright",
+            "with_margin": False}
+
+
+def picture_of(text):
+    data = re.search(r"data:image/png;base64,([^\"]+)", text).group(1)
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(data))))
+
+
+def test_numpy_takes_a_tomogram_for_its_array(made):
+    tomogram = made.tomogram
+    assert tomogram.shape == (16, 32, 32) and tomogram.voxel_size_A == 10
+    assert np.asarray(tomogram) is tomogram.values
+    assert np.mean(tomogram) == tomogram.values.mean()
+    np.testing.assert_array_equal(tomogram[3], tomogram.values[3])
+    np.testing.assert_array_equal(tomogram.section("x"), tomogram.values[:, :, 16])
+    np.testing.assert_array_equal(tomogram.section("y", 5), tomogram.values[:, 5])
+    with pytest.raises(tomofield.Error, match="one of 'x', 'y', 'z', not 'w'"):
+        tomogram.section("w")
+
+
+def test_notebooks_show_the_middle_section(made):
+    picture = picture_of(made.tomogram._repr_html_())
+    section = made.tomogram.section()[::-1]
+    low, high = np.percentile(section, [0.5, 99.5])
+    expected = 255 * np.clip((section - low) / (high - low), 0, 1)
+    np.testing.assert_allclose(picture, expected, atol=0.51)
+    assert "32 × 32 × 16 voxels (x, y, z) of 10 Å" in made.tomogram._repr_html_()
+    np.testing.assert_array_equal(picture_of(made.model._repr_html_()), picture)
+    assert made.verdict in made._repr_html_().replace("&#x27;", "'")
+
+
+def test_large_sections_become_small_pictures():
+    ramp = np.broadcast_to(np.arange(2000, dtype=np.float32), (1, 1100, 2000))
+    picture = picture_of(tomofield.Tomogram(ramp, 5.0)._repr_html_())
+    assert picture.shape == (275, 500)
+    assert (np.diff(picture.astype(int), axis=1) >= 0).all() and picture.max() == 255
+    flat = tomofield.Tomogram(np.full((2, 3, 1500), np.nan, np.float32), 5.0)
+    assert picture_of(flat._repr_html_()).max() == 0
+
+
+def test_mrc_files_are_written_and_read(made, tmp_path):
+    path = tmp_path / "t.mrc"
+    made.tomogram.write(path)
+    assert mrcfile.validate(path)
+    with mrcfile.open(path) as file:
+        np.testing.assert_array_equal(file.data, made.tomogram.values)
+        assert float(file.voxel_size.x) == 10
+    again = tomofield.read_mrc(path)
+    np.testing.assert_array_equal(again.values, made.tomogram.values)
+    assert again.voxel_size_A == 10
+    with pytest.raises(tomofield.Error, match="t.mrc' exists"):
+        made.tomogram.write(path)
+    tomofield.write_mrc(path, np.ones((2, 3, 4)), 2.5, overwrite=True)
+    assert tomofield.read_mrc(path).shape == (2, 3, 4)
+    with pytest.raises(tomofield.Error, match="give voxel_size_A, in Å"):
+        tomofield.write_mrc(path, np.ones((2, 3, 4)), overwrite=True)
+    with pytest.raises(tomofield.Error, match="voxels of 0 Å"):
+        tomofield.write_mrc(path, np.ones((2, 3, 4)), 0, overwrite=True)
+    with pytest.raises(tomofield.Error, match="absent.mrc"):
+        tomofield.read_mrc("absent.mrc")
+
+
+def test_a_written_stack_is_still_a_tilt_series(series, options, tmp_path):
+    tomofield.write_mrc(tmp_path / "views.mrc", series.views, 10)
+    copied = tomofield.baseline(tmp_path / "views.mrc", "wbp", **options).tomogram
+    direct = tomofield.baseline(series.folder / "s.mrc", "wbp", **options).tomogram
+    np.testing.assert_array_equal(copied.values, direct.values)
+
+
+def test_export_writes_what_the_command_writes(series, made, tmp_path):
+    model = series.folder / "tomogram.h5"
+    for name, words, options in (
+            ("all", (), {}), ("coarse", ("--voxel-size", 20, "--mode", 12),
+                              {"voxel_size_A": 20, "voxel_type": "float16"}),
+            ("box", ("--center", "12,13,8", "--size", "9,8,7", "--rotate", "10,20,30", "--invert"),
+             {"box": tomofield.Box((12, 13, 8), (9, 8, 7), euler_deg=(10, 20, 30)),
+              "invert": True})):
+        series.run("export", model, "-o", tmp_path / f"{name}_cli.mrc", *words)
+        tomofield.export(model, tmp_path / f"{name}.mrc", **options)
+        assert ((tmp_path / f"{name}.mrc").read_bytes()
+                == (tmp_path / f"{name}_cli.mrc").read_bytes()), name
+    tomofield.export(made.model, tmp_path / "all.mrc", overwrite=True)
+    np.testing.assert_array_equal(mrcfile.read(tmp_path / "all.mrc"), made.tomogram.values)
+    with pytest.raises(tomofield.Error, match="all.mrc' exists"):
+        tomofield.export(model, tmp_path / "all.mrc")
+    with pytest.raises(tomofield.Error, match="outside of the model"):
+        tomofield.export(model, tmp_path / "far.mrc", box=tomofield.Box((900, 0, 0), (2, 2, 2)))
+    with pytest.raises(tomofield.Error, match="leave voxel_size_A out"):
+        tomofield.export(model, tmp_path / "x.mrc", box=tomofield.Box((9, 9, 9), (2, 2, 2)),
+                         voxel_size_A=5)
+
+
+@pytest.mark.parametrize("method", ("wbp", "sirt", "sart-tv", "tv"))
+def test_baselines_are_those_of_the_command(series, options, method, tmp_path):
+    series.run("baseline", method, "s.mrc", "--tlt", "s.tlt", "--thickness", 16, "--contrast",
+               "bright", "--no-margin", "-o", tmp_path / "b.mrc")
+    steps = []
+    made = tomofield.baseline(series.folder / "s.mrc", method, progress=steps.append, **options)
+    np.testing.assert_array_equal(made.tomogram.values, mrcfile.read(tmp_path / "b.mrc"))
+    written = tomofield.read_record(tmp_path / "b.mrc")
+    assert made.options["method"] == written.options["method"]
+    assert made.model is None and made.verdict == "" and made.metrics["size_px"] == [32, 32, 16]
+    assert steps[-1].fraction_done == 1
+    in_memory = {key: value for key, value in options.items() if key != "tlt"}
+    again = tomofield.baseline(series.views, method, series.tilt_deg, pixel_size_A=10, **in_memory)
+    np.testing.assert_array_equal(again.tomogram.values, made.tomogram.values)
+
+
+def test_baselines_can_be_stopped_and_refuse_what_they_cannot_do(series, options):
+    stack = series.folder / "s.mrc"
+    stopped = tomofield.baseline(stack, "sirt", progress=lambda p: p.fraction_done < 0.2, **options)
+    assert not stopped.is_finished and stopped.tomogram is None
+
+    def fail(progress):
+        raise ZeroDivisionError("of the callback")
+    with pytest.raises(ZeroDivisionError, match="of the callback"):
+        tomofield.baseline(stack, "sirt", progress=fail, **options)
+    with pytest.raises(tomofield.Error, match="'wbp', 'sirt', 'sart-tv', 'tv', not 'fbp'"):
+        tomofield.baseline(stack, "fbp", **options)
+    with pytest.raises(tomofield.Error, match="stays in memory"):
+        tomofield.baseline(stack, output="b.mrc", **options)
+
+
+def test_denoise_fits_again_without_trials(series, made):
+    reports = []
+    strong = tomofield.denoise(made, "strong", progress=reports.append)
+    assert {report.is_trial for report in reports} == {False}
+    fit, again = made.options["fit"], strong.options["fit"]
+    for name in ("penalty", "density_variation", "spike_rank", "prior", "fit_view_scale", "epochs"):
+        assert again[name] == fit[name], name
+    assert again["denoise"] == "strong"
+
+    def roughness(volume):
+        return np.abs(np.diff(volume.values, axis=2)).mean()
+    light = tomofield.denoise(made, "light")
+    assert roughness(strong.tomogram) < roughness(made.tomogram) < roughness(light.tomogram)
+    same = tomofield.denoise(made, "medium")
+    np.testing.assert_array_equal(same.tomogram.values, made.tomogram.values)
+    with pytest.raises(tomofield.Error, match="only a finished result"):
+        tomofield.denoise(tomofield.baseline(series.views, "wbp", series.tilt_deg, thickness=16,
+                                             pixel_size_A=10), "light")
+
+
+def test_voxel_sizes_come_from_tomograms_or_are_asked_for(made, series):
+    truth = tomofield.Tomogram(series.truth, 10.0)
+    assert (tomofield.correlate_shells(made.tomogram, truth).frequency_per_A[-1]
+            == pytest.approx(1 / 20))
+    with pytest.raises(tomofield.Error, match="give voxel_size_A"):
+        tomofield.correlate_shells(series.truth, series.truth)
