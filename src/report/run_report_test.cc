@@ -82,8 +82,10 @@ TEST_F(RunReport, ShowsWarningsAndNumbers) {
 
 TEST_F(RunReport, ShowsTheDiameterOfBeadsThatWereFound) {
   EXPECT_FALSE(page_has("found in the views"));
-  json& mask = record_["metrics"]["mask"];
-  mask.update({{"beads", 8}, {"bead_masking", "masked"}, {"bead_diameter_nm", 10.25}});
+  tilt_series::MaskMetrics& masks = record_.fit.metrics.mask.masks;
+  masks.num_beads = 8;
+  masks.bead_masking = tilt_series::BeadMasking::kMasked;
+  masks.bead_diameter_A = 102.5;
   EXPECT_TRUE(page_has("10.2 nm"));
   EXPECT_TRUE(page_has("found in the views"));
   options_.views.bead_diameter_nm = 12;
