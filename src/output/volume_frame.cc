@@ -42,7 +42,36 @@ Rotation rotation(double pitch_deg, double alpha_deg, int hand) {
   return product(about_y, about_x);
 }
 
+// Returns an angle, or 0 if the views are not sure of it.
+double sure_angle(double angle_deg, double error_deg) {
+  constexpr double kSure = 3.0;
+  return std::abs(angle_deg) >= kSure * error_deg ? angle_deg : 0.0;
+}
+
 }  // namespace
+
+Levelling found_levelling(const std::filesystem::path& model) {
+  constexpr const char* kAdvice = "give both angles in degrees: --level PITCH,X_TILT";
+  const std::filesystem::path path = output_paths(model).alignment;
+  if (!io::is_file(path)) {
+    throw Error(
+        fmt::format("there is no '{}' beside '{}', which --align writes, to level it by: {}",
+                    path.string(), model.string(), kAdvice));
+  }
+  try {
+    const alignment::AlignmentRecord record = alignment::record_from(io::read_json(path));
+    if (!record.pose) throw Error("the views could not tell the pitch");
+    const auto& [pose, error] = *record.pose;
+    const Levelling found{.pitch_deg = sure_angle(pose.pitch_deg, error.pitch_deg),
+                          .x_tilt_deg = sure_angle(pose.x_tilt_deg, error.x_tilt_deg)};
+    if (found.pitch_deg == 0.0 && found.x_tilt_deg == 0.0)
+      throw Error("neither the pitch nor the tilt about X is three of its standard errors");
+    return found;
+  } catch (const std::exception& error) {
+    throw Error(fmt::format("'{}' does not tell how to level the specimen: {}; {}", path.string(),
+                            error.what(), kAdvice));
+  }
+}
 
 VolumeFrame::VolumeFrame(const ModelInfo& model, const Levelling& levelling)
     : centre_{model.geometry.axis_x, static_cast<double>(model.geometry.height) / 2,
@@ -64,24 +93,6 @@ field::OrientedBox VolumeFrame::to_field(const field::OrientedBox& box) const {
   turned_box.centre_px = to_field(box.centre_px);
   turned_box.field_from_box = product(field_from_volume_, box.field_from_box);
   return turned_box;
-}
-
-Levelling found_levelling(const std::filesystem::path& model) {
-  constexpr const char* kAdvice = "give both angles in degrees: --level PITCH,X_TILT";
-  const std::filesystem::path path = output_paths(model).alignment;
-  if (!io::is_file(path)) {
-    throw Error(
-        fmt::format("there is no '{}' beside '{}', which --align writes, to level it by: {}",
-                    path.string(), model.string(), kAdvice));
-  }
-  try {
-    const alignment::AlignmentRecord record = alignment::record_from(io::read_json(path));
-    if (!record.pose) throw Error("the views could not tell the pitch");
-    return {.pitch_deg = record.pose->pose.pitch_deg, .x_tilt_deg = record.pose->pose.x_tilt_deg};
-  } catch (const std::exception& error) {
-    throw Error(fmt::format("'{}' does not tell how to level the specimen: {}; {}", path.string(),
-                            error.what(), kAdvice));
-  }
 }
 
 }  // namespace tomofield::output

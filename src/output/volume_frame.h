@@ -14,6 +14,11 @@ struct Levelling {
   double x_tilt_deg = 0.0;  ///< is subtracted from the x-axis tilts of all views
 };
 
+/// Returns how far the specimen of a model was found to be from level by the alignment of its
+/// run, which lies beside the model (NAME_align.json of NAME.h5). An angle below three of its
+/// standard errors is 0. Throws Error if there is no such file, or if it could not tell an angle.
+Levelling found_levelling(const std::filesystem::path& model);
+
 /// The place of a volume in the field of a model. A point P of the volume lies in the field at
 ///
 ///   C + D Ry(pitch) Rx(alpha - x_tilt) D (P − C),    D = diag(1, 1, hand)
@@ -33,10 +38,5 @@ class VolumeFrame {
   field::Point centre_;
   field::Rotation field_from_volume_;
 };
-
-/// Returns how far the specimen of a model was found to be from level by the alignment of its
-/// run, which lies beside the model (NAME_align.json of NAME.h5). Throws Error if there is none, or
-/// if it could not tell.
-Levelling found_levelling(const std::filesystem::path& model);
 
 }  // namespace tomofield::output

@@ -245,16 +245,36 @@ def test_a_levelled_volume_has_the_specimen_where_it_is(tilted):
     np.testing.assert_allclose(spots(volume), PLACES, atol=0.4)
 
 
+def alignment_record(pose):
+    """Returns the record of an alignment of one view that found this pose."""
+    view = {"section": 1, "tilt_deg": 0, "shift_px": [0, 0], "rotation_deg": 0,
+            "log_magnification": 0, "tilt_change_deg": 0, "correlation": 0.9,
+            "shift_error_px": [0.1, 0.1], "left_out": False}
+    series = {"sections": 1, "size_px": [8, 8], "files": {}, "header_tilts": "0", "pixels": "0"}
+    return {"made_with": {}, "series": series, "accepted": True, "rotation": True,
+            "magnification": True, "tilt": True, "steps_px": [0.1], "seconds": 1, "views": [view],
+            "held_out_error": {"before": 0.5, "after": 0.4},
+            "gain": {"mean": 0.1, "standard_error": 0.01}, "pose": pose}
+
+
 def test_what_the_alignment_found_levels_the_volume(tilted, scratch):
     shutil.copy(os.path.join(tilted, "TS_01.h5"), scratch)
     refused = harness.tomofield("export", "TS_01.h5", "-o", "level.mrc", "--level", "found",
                                 cwd=scratch)
     assert refused.returncode == 2
     assert "TS_01_align.json" in refused.stderr and "--level PITCH,X_TILT" in refused.stderr
-    with open(os.path.join(scratch, "TS_01_align.json"), "w", encoding="utf-8") as file:
-        json.dump({"pose": {"pitch_deg": PITCH, "x_tilt_deg": -X_TILT}}, file)
-    np.testing.assert_array_equal(levelled(scratch, "--level", "found"),
-                                  levelled(scratch, "--level", f"{PITCH},{-X_TILT}"))
+    for errors, level in (((1, 1), f"{PITCH},{-X_TILT}"), ((1, 2), f"{PITCH},0"), ((3, 2), None)):
+        pose = {"pitch_deg": PITCH, "pitch_error_deg": errors[0], "x_tilt_deg": -X_TILT,
+                "x_tilt_error_deg": errors[1], "thickness_px": 20, "thickness_error_px": 2}
+        with open(os.path.join(scratch, "TS_01_align.json"), "w", encoding="utf-8") as file:
+            json.dump(alignment_record(pose), file)
+        if level is None:  # the views are sure of neither angle
+            refused = harness.tomofield("export", "TS_01.h5", "-o", "unsure.mrc", "--level", "found",
+                                        cwd=scratch)
+            assert refused.returncode == 2 and "standard errors" in refused.stderr, refused.stderr
+        else:
+            np.testing.assert_array_equal(levelled(scratch, "--level", "found"),
+                                          levelled(scratch, "--level", level))
 
 
 def test_boxes_and_particles_lie_in_the_levelled_volume(tilted):
