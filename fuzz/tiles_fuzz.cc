@@ -24,7 +24,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::refuse_or([&] {
     const checkpoint::FinishedTiles tiles(options, series, origin);
     tiles.report();
-    tiles.mean_of("residual");
+    tiles.mean_of(&checkpoint::FinishedTile::residual);
   });
   return 0;
 }

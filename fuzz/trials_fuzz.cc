@@ -1,9 +1,9 @@
 #include <nlohmann/json.hpp>
 
 #include "fuzz_input.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "tune/trial_file.h"
-#include "tune/trial_settings.h"
+#include "tune/trial_record.h"
 #include "tune/tuning.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -12,8 +12,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const tune::TrialSettings settings{Penalty::kSmooth, 5, 12, 30};
   fuzz::refuse_or([&] {
     const tune::TrialFile trials(file.path(), "{}", /*reuse=*/true);
-    const auto found = trials.find(tune::settings_json(settings));
-    if (found) tune::trial_from(*found);
+    trials.find(settings);
   });
   fuzz::refuse_or([&] {  // the tuning in a checkpoint
     try {

@@ -10,15 +10,15 @@
 #include <string>
 #include <vector>
 
-#include "alignment_seed.h"
+#include "align/alignment_record.h"
 #include "base/threads/parallel.h"
 #include "checkpoint/checkpoint.h"
+#include "checkpoint/tile_record.h"
 #include "compact/compress.h"
 #include "geometry/view_warp.h"
 #include "io/images/mrc.h"
 #include "small_fit.h"
-#include "tune/trial_file.h"
-#include "tune/trial_settings.h"
+#include "tune/trial_record.h"
 #include "tune/tuning.h"
 #include "uneven_model.h"
 
@@ -197,7 +197,7 @@ void write_trials(const fs::path& folder, const fs::path& batch) {
   using namespace tune;
   const TrialSettings settings{Penalty::kSmooth, 5, 12, 30};
   const tune::HeldOutScore score{1.25, {1.0, 1.5}};
-  const nlohmann::json trial = tune::trial_json(settings_json(settings), score, 2.5);
+  const nlohmann::json trial = tune::to_json(tune::FitTrial{settings, score, 2.5});
   write(folder / "file", nlohmann::json{{"fingerprint", "{}"}, {"trials", {trial, trial}}}.dump());
   const nlohmann::json chosen = settings_json(settings);
   write(batch / "vote", nlohmann::json{{"chosen", chosen}}.dump());
@@ -210,55 +210,57 @@ void write_trials(const fs::path& folder, const fs::path& batch) {
   write(folder / "tuning", tuning_json(tuned).dump());
 }
 
-// Writes a record as realign::alignment_record() does: plain, and with beads, a pose and local
-// motion.
+// Writes two records of an alignment: a plain one, and one with beads, a pose and local motion.
 void write_alignments(const fs::path& folder) {
-  nlohmann::json views = nlohmann::json::array();
-  for (int section = 1; section <= 3; ++section)
-    views.push_back({{"section", section},
-                     {"tilt_deg", 20 * section - 40},
-                     {"shift_px", {1.5, -2}},
-                     {"rotation_deg", 0.25},
-                     {"log_magnification", 0.01},
-                     {"tilt_change_deg", 0.5},
-                     {"correlation", 0.9},
-                     {"shift_error_px", {0.1, 0.2}},
-                     {"left_out", section == 2}});
-  const nlohmann::json gain{{"held_out_error", {{"before", 0.5}, {"after", 0.4}}},
-                            {"gain", {{"mean", 0.1}, {"standard_error", 0.01}}}};
-  nlohmann::json record = fuzz::alignment_origin();
-  record.update(gain);
-  record.update({{"accepted", true},
-                 {"rotation", true},
-                 {"magnification", true},
-                 {"tilt", true},
-                 {"steps_px", {1.0, 0.1}},
-                 {"seconds", 1.5},
-                 {"views", views}});
-  write(folder / "plain", record.dump());
-  record["pose"] = {{"pitch_deg", 1.0},
-                    {"pitch_error_deg", 0.1},
-                    {"thickness_px", 20},
-                    {"thickness_error_px", 2}};
-  record["beads"] = {{"beads", 5},
-                     {"distance_px", {{"files", 2.0}, {"before", 2.0}, {"after", 0.3}}},
-                     {"gain", gain["gain"]},
-                     {"accepted", true}};
-  record["local"] = gain;
-  record["local"].update(
-      {{"accepted", true}, {"steps_px", {0.1}}, {"size_px", {24, 20}}, {"rms_px", 0.2}});
-  for (nlohmann::json& view : record["views"]) view["local_px"] = geometry::ViewWarp{}.rows();
-  write(folder / "whole", record.dump());
+  using namespace alignment;
+  AlignmentRecord record{
+      .origin = {.num_sections = 3,
+                 .size_px = {kWidth, kHeight},
+                 .files = {{"tlt", "00ff"}},
+                 .header_tilts = "01",
+                 .pixels = "02",
+                 .made_with = {{"seed", 1}}},
+      .is_accepted = true,
+      .freedoms = {.rotation = true, .magnification = true, .tilt = true},
+      .held_out = {.before = 0.5, .after = 0.4, .gain = {.mean = 0.1, .error = 0.01}},
+      .steps_px = {1.0, 0.1},
+      .seconds = 1.5};
+  for (int section = 0; section < 3; ++section)
+    record.views.push_back({.section = section,
+                            .tilt_deg = 20.0 * section - 20,
+                            .shift_px = {1.5, -2},
+                            .rotation_deg = 0.25,
+                            .log_magnification = 0.01,
+                            .tilt_change_deg = 0.5,
+                            .agreement = {.correlation = 0.9, .error_px = {0.1, 0.2}},
+                            .is_left_out = section == 1});
+  write(folder / "plain", to_json(record).dump());
+  record.pose = FoundPose{.pose = {.thickness_px = 20, .pitch_deg = 1},
+                          .error = {.thickness_px = 2, .pitch_deg = 0.1}};
+  record.beads = BeadRecord{5, 2.0, 2.0, 0.3, {.mean = 0.1, .error = 0.01}, true};
+  record.local =
+      LocalRecord{.trial = {.held_out = record.held_out, .steps_px = {0.1}, .is_accepted = true},
+                  .size_px = {kWidth, kHeight},
+                  .rms_px = 0.2};
+  for (AlignedView& view : record.views)
+    view.local = geometry::ViewWarp{.width_px = kWidth, .height_px = kHeight};
+  write(folder / "whole", to_json(record).dump());
 }
 
 // Writes the tiles of a run as checkpoint::FinishedTiles does.
 void write_tiles(const fs::path& folder, const output::Model& model) {
   fs::create_directories(folder);
-  const nlohmann::json tile{{"rows", {0, 64}},           {"residual", 1.0},
-                            {"seconds_fitting", 2.0},    {"seconds_compressing", 1.0},
-                            {"parameters", 10},          {"bytes", 100},
-                            {"mean_square_change", 0.1}, {"variance", 1.0},
-                            {"decibels", 0.1},           {"volume", 9.0}};
+  const std::vector<checkpoint::FinishedTile> tiles{{.rows = {0, 64},
+                                                     .fitted_rows = {0, 80},
+                                                     .residual = 1.0,
+                                                     .seconds_fitting = 2.0,
+                                                     .seconds_compressing = 1.0,
+                                                     .report = {.parameters = 10,
+                                                                .bytes = 100,
+                                                                .mean_square_change = 0.1,
+                                                                .variance = 1.0,
+                                                                .decibels = 0.1,
+                                                                .volume = 9.0}}};
   const auto numbers_of = [](const std::string& text) {
     return std::vector<std::int64_t>(text.begin(), text.end());
   };
@@ -267,7 +269,7 @@ void write_tiles(const fs::path& folder, const output::Model& model) {
       .doubles = {},
       .integers = {{"fingerprint", numbers_of("the fingerprint")},
                    {"budget", numbers_of("0.1dB")},
-                   {"tiles", numbers_of(nlohmann::json::array({tile}).dump())}}};
+                   {"tiles", numbers_of(checkpoint::to_json(tiles).dump())}}};
   output::save_coded(folder / "tiles", *model.coded, model, &state);
 }
 

@@ -42,7 +42,7 @@ class ShiftedSeries {
     options.resample = false;
     const tilt_series::TiltSeries series(options);
     const auto& processes = distributed::Communicator::alone();
-    const align::JointProblem problem{
+    const alignment::JointProblem problem{
         .recorded = series,
         .plan = measurement::plan_realigned(series, specimen_, processes),
         .field = {},
@@ -58,8 +58,8 @@ class ShiftedSeries {
       found[view].shift_x_px -= right_[view].shift_x_px;
       found[view].shift_y_px -= right_[view].shift_y_px;
     }
-    align::remove_gauge(geometry::centred_geometry(size_, size_, specimen_.thickness, tilt_deg_),
-                        found);
+    alignment::remove_gauge(
+        geometry::centred_geometry(size_, size_, specimen_.thickness, tilt_deg_), found);
     double squares = 0.0;
     for (const ViewCorrection& c : found)
       squares += c.shift_x_px * c.shift_x_px + c.shift_y_px * c.shift_y_px;

@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "kernels/simd_target.h"
+#include "kernels/lanes.h"
 
 namespace tomofield::testing {
 

@@ -7,13 +7,12 @@
 #include <numeric>
 #include <vector>
 
-#include "base/stop_requested.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 #include "base/threads/parallel.h"
 #include "measurement/prepare.h"
 #include "objective/constants.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 // Predicted views take at most this memory together.
@@ -226,4 +225,4 @@ void run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
   }
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -16,7 +16,7 @@
 #include "measurement/measurement.h"
 #include "tomofield/options.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Returns the options of a field of plain vertices that serves to align views, like the field of a
 /// reconstruction in all else.
@@ -90,4 +90,4 @@ void run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
                       const std::function<bool(const fit::Stage&)>& update,
                       const distributed::Communicator& processes);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

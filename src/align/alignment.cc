@@ -15,7 +15,7 @@
 #include "align/start/correlation_start.h"
 #include "align/trial.h"
 #include "align/unalike.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "measurement/prepare.h"
@@ -23,7 +23,7 @@
 #include "tilt_series/resampling/binning.h"
 #include "tomofield/error.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 // Views are correlated in images of at most about this width and height.
@@ -161,4 +161,4 @@ Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::Vi
   return alignment;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -13,7 +13,7 @@
 #include "geometry/view_correction.h"
 #include "measurement/measurement.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// An alignment is judged by views that it holds out, so it needs some.
 constexpr std::size_t kFewestViews = 12;
@@ -75,4 +75,4 @@ std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& probl
 Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::ViewCorrection> start,
                            const distributed::Communicator& processes);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

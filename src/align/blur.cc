@@ -4,7 +4,7 @@
 
 #include "base/gaussian_kernel.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 // Adds to each pixel the pixels of its row, weighted by the kernel.
@@ -51,4 +51,4 @@ std::vector<float> gaussian_blur(std::span<const float> image, std::int64_t widt
   return blurred;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -7,7 +7,7 @@
 
 #include "random_arrays.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 // Returns the sum over the whole neighbourhood of every pixel, in two dimensions and in double
@@ -55,4 +55,4 @@ TEST(GaussianBlur, OfNoWidthIsTheImage) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

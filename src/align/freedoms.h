@@ -1,6 +1,6 @@
 #pragma once
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// The quantities of a view that a registration may change.
 struct Freedoms {
@@ -12,4 +12,4 @@ struct Freedoms {
   bool operator==(const Freedoms&) const = default;
 };
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

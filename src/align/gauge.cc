@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 #include <Eigen/QR>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 void remove_gauge(const geometry::TiltGeometry& geometry,
                   std::span<geometry::ViewCorrection> corrections) {
@@ -45,4 +45,4 @@ void remove_gauge(const geometry::TiltGeometry& geometry,
   }
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -5,7 +5,7 @@
 #include "geometry/tilt_geometry.h"
 #include "geometry/view_correction.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Removes the part of the corrections that the views cannot tell, because another place, pose or
 /// size of the specimen explains it as well:
@@ -22,4 +22,4 @@ namespace tomofield::align {
 void remove_gauge(const geometry::TiltGeometry& geometry,
                   std::span<geometry::ViewCorrection> corrections);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -8,7 +8,7 @@
 
 #include "base/random.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::TiltGeometry;
@@ -123,4 +123,4 @@ TEST(Gauge, ViewsOfOneTiltLoseTheirMeanShift) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

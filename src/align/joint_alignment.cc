@@ -9,18 +9,18 @@
 #include "align/gauge.h"
 #include "align/local/local_registration.h"
 #include "align/local/slow_modes.h"
-#include "align/mean_gain.h"
 #include "align/prediction_by_tilt.h"
 #include "align/registration.h"
 #include "align/relaxation.h"
 #include "align/start/exposures.h"
 #include "align/start/slab_pose_search.h"
+#include "base/statistics.h"
 #include "base/trace.h"
 #include "fit/fit.h"
 #include "fit/stages.h"
-#include "geometry/tilt_order.h"
+#include "geometry/tilt_geometry.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewCorrection;
@@ -132,7 +132,7 @@ class AligningFit {
   static void keep_axis(std::vector<ViewCorrection>& steps) {
     std::vector<double> rotations;
     for (const ViewCorrection& step : steps) rotations.push_back(step.rotation_rad);
-    const MeanGain common = mean_gain(rotations);
+    const base::MeanGain common = base::mean_gain(rotations);
     if (std::abs(common.mean) > kSurePay * common.error) return;
     for (ViewCorrection& step : steps) step.rotation_rad -= common.mean;
   }
@@ -198,7 +198,7 @@ class AligningFit {
       const double before = registration->predicted_error(without);
       if (before > 0.0) gains.push_back(1.0 - registration->predicted_error(with) / before);
     }
-    return mean_gain(gains).exceeds(with.tilt && !without.tilt ? kSureOfTilts : kSurePay);
+    return base::mean_gain(gains).exceeds(with.tilt && !without.tilt ? kSureOfTilts : kSurePay);
   }
 
   const JointProblem& problem_;
@@ -234,4 +234,4 @@ std::vector<double> coarse_residuals(const JointProblem& problem,
   return fit.residuals();
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "align/freedoms.h"
-#include "align/start/slab_pose.h"
 #include "base/progress.h"
 #include "distributed/communicator.h"
 #include "geometry/view_correction.h"
@@ -16,7 +15,18 @@
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
+
+/// Describes a slab in the tilted views.
+struct SlabPose {
+  double thickness_px = 0.0;  ///< in pixels of the images
+  double pitch_deg = 0.0;     ///< is added to all tilt angles: the slab lies level with them
+};
+
+/// The most likely pose, and the standard error of each of its numbers.
+struct FoundPose {
+  SlabPose pose, error;
+};
 
 /// Describes how well a view agrees with the projection of the field that it was registered to
 /// last.
@@ -24,6 +34,7 @@ struct ViewAgreement {
   double correlation = 0.0;  ///< of both images, without trends
   /// Standard error of the shift in x and y, in pixels before binning.
   std::array<double, 2> error_px{};
+  bool operator==(const ViewAgreement&) const = default;
 };
 
 /// The result of align_jointly(), and how well each view agrees with its prediction.
@@ -75,4 +86,4 @@ std::vector<double> coarse_residuals(const JointProblem& problem,
                                      const std::vector<geometry::ViewCorrection>& start,
                                      const distributed::Communicator& processes);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

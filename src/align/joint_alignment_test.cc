@@ -5,7 +5,7 @@
 #include "base/threads/parallel.h"
 #include "shifted_series.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using testing::ShiftedSeries;
@@ -50,4 +50,4 @@ TEST(JointAlignment, SameBitsForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

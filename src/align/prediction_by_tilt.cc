@@ -7,7 +7,7 @@
 
 #include "base/trace.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr double kStep_deg = 0.25;
@@ -41,4 +41,4 @@ std::vector<std::vector<float>> predictions_by_tilt(measurement::Measurement& me
   return derivatives;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

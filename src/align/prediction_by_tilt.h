@@ -5,7 +5,7 @@
 #include "fit/fit.h"
 #include "measurement/measurement.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Returns the derivative of the prediction of each view by its tilt angle in degrees, [view][y,
 /// x], as the difference between predictions at larger and smaller tilts. `measurement` must be
@@ -14,4 +14,4 @@ namespace tomofield::align {
 std::vector<std::vector<float>> predictions_by_tilt(measurement::Measurement& measurement,
                                                     fit::Fit& fit);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -8,7 +8,7 @@
 
 #include "align/blur.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr double kRadian_deg = 180.0 / std::numbers::pi;
@@ -319,4 +319,4 @@ double Registration::correlation() const {
   return variances > 0.0 ? without_trends(kScale, kMeasured) / std::sqrt(variances) : 0.0;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -11,7 +11,7 @@
 #include "align/local/local_registration.h"
 #include "geometry/view_correction.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// A view and its prediction, both [y, x] in pixels of a stage.
 struct ImagePair {
@@ -103,4 +103,4 @@ class Registration {
   std::array<std::int64_t, 2> num_pixels_{};
 };
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -11,7 +11,7 @@
 #include "base/random.h"
 #include "gaussian_scene.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewCorrection;
@@ -284,4 +284,4 @@ TEST(Registration, CorrelationIsOneWithoutNoiseAndFallsWithIt) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

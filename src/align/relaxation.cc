@@ -4,7 +4,7 @@
 #include <numeric>
 #include <utility>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr double kTurned = 0.7;    // of the last step, from which on steps become shorter
@@ -28,4 +28,4 @@ double Relaxation::next(std::vector<double> found) {
   return factor_;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Returns true if a step of an iteration undoes more than a part of the last one, which went too
 /// far then. Both have the same size. A last step of zeros is never undone.
@@ -27,4 +27,4 @@ class Relaxation {
   std::vector<double> last_;
 };
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 TEST(Relaxation, StepsBecomeShorterOnceTheyTurnBack) {
@@ -35,4 +35,4 @@ TEST(Relaxation, UpdatesConvergeEvenIfRegistrationsShowFarTooMuch) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

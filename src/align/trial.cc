@@ -12,7 +12,7 @@
 #include "measurement/held_out.h"
 #include "measurement/prepare.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr int kEvery = 8;
@@ -32,7 +32,7 @@ Comparison compare_errors(const std::vector<double>& before, const std::vector<d
   const auto n = static_cast<double>(std::max<std::size_t>(gains.size(), 1));
   comparison.before /= n;
   comparison.after /= n;
-  comparison.gain = mean_gain(gains);
+  comparison.gain = base::mean_gain(gains);
   return comparison;
 }
 
@@ -103,4 +103,4 @@ Comparison compare(AlignmentTrial& before, AlignmentTrial& after) {
   return compare_errors(before.fine_errors(), after.fine_errors());
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -5,14 +5,14 @@
 #include <vector>
 
 #include "align/joint_alignment.h"
-#include "align/mean_gain.h"
+#include "base/statistics.h"
 #include "distributed/communicator.h"
 #include "fit/fit.h"
 #include "geometry/view_correction.h"
 #include "measurement/measurement.h"
 #include "tomofield/options.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Returns the options of the fit of an AlignmentTrial.
 FitOptions held_out_fit(std::uint64_t seed);
@@ -54,11 +54,11 @@ class AlignmentTrial {
 /// Compares the errors of held-out views with two alignments.
 struct Comparison {
   double before = 0.0, after = 0.0;  ///< mean errors of the views that have one
-  MeanGain gain;                     ///< of the differences over the views
+  base::MeanGain gain;               ///< of the differences over the views
 };
 
 /// Compares two alignments by their errors in wide pixels if these differ by more than three
 /// standard errors, else by those in the pixels of the views.
 Comparison compare(AlignmentTrial& before, AlignmentTrial& after);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <vector>
 
-#include "base/stop_requested.h"
+#include "base/progress.h"
 #include "shifted_series.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewCorrection;
@@ -78,4 +78,4 @@ TEST(AlignmentTrial, StopsInEitherPartIfAsked) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

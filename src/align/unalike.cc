@@ -5,9 +5,9 @@
 #include <cstddef>
 
 #include "base/statistics.h"
-#include "geometry/tilt_order.h"
+#include "geometry/tilt_geometry.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr std::ptrdiff_t kNeighbours = 4;  // to each side, in order of tilt
@@ -47,4 +47,4 @@ std::vector<int> unalike(std::span<const double> tilt_deg, std::span<const doubl
   return views;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

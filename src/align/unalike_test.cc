@@ -7,7 +7,7 @@
 
 #include "base/random.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 struct Correlations {
@@ -55,4 +55,4 @@ TEST(Unalike, FewViewsTellNothing) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -4,7 +4,6 @@
 #include <string>
 
 #include "io/saving/output_files.h"
-#include "option_table/name_list.h"
 #include "option_table/setting.h"
 #include "option_table/values.h"
 #include "projects/project.h"

@@ -52,4 +52,10 @@ class CodeText {
   std::string text_;
 };
 
+/// HTML, with SVG inside. A text from outside has its special characters replaced.
+struct Markup {
+  static std::string quoted(std::string_view text);
+};
+using Html = CodeText<Markup>;
+
 }  // namespace tomofield::base

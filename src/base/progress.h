@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+#include <ctime>
 #include <functional>
 #include <string>
 #include <utility>
@@ -36,5 +38,38 @@ inline ProgressSink part_of(const ProgressSink& whole, double begin, double size
     whole(report);
   };
 }
+
+/// Is thrown by every process of a computation after a stop was requested of one of them.
+struct StopRequested {};
+
+/// Returns a duration as "2 h 05 min", "3 min 20 s" or "12 s".
+std::string time_text(double seconds);
+
+/// Measures the wall-clock time since it was made or restarted.
+class Stopwatch {
+ public:
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  void restart() { start_ = std::chrono::steady_clock::now(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// Measures the processor time of all threads of this process since it was made. Other programs on
+/// the machine change it little.
+class ProcessorStopwatch {
+ public:
+  double seconds() const { return now() - start_; }
+
+ private:
+  static double now() {
+    timespec time{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  }
+  double start_ = now();
+};
 
 }  // namespace tomofield::base

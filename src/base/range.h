@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace tomofield::base {
@@ -42,5 +43,10 @@ inline std::vector<Range> parts_of(int count, int size) {
     parts.push_back({begin_of(part), begin_of(part + 1)});
   return parts;
 }
+
+/// Returns part `index` of `count` parts of consecutive pieces, where `work` holds the cost of each
+/// piece. Every part has at least one piece, and begins where the work before it is nearest to
+/// index / count of the total. There must be at least `count` pieces.
+Range part_of(std::span<const double> work, int index, int count);
 
 }  // namespace tomofield::base

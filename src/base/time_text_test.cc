@@ -1,4 +1,4 @@
-#include "base/time_text.h"
+#include "base/progress.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,5 @@
 #include "baseline/method.h"
 
-#include <nlohmann/json.hpp>
-
 namespace tomofield::baseline {
 namespace {
 
@@ -51,12 +49,6 @@ MethodSize size_of(const Method& method, const projection::SampleGrid& grid,
           return {num_voxels(grid, num_rows), 0};
       },
       method);
-}
-
-nlohmann::json json_of(const Method& method) {
-  nlohmann::json json = std::visit([](const auto& options) { return options.json(); }, method);
-  json["name"] = facts_of(method).name;
-  return json;
 }
 
 std::optional<double> last_decrease(const Solution& solution) {

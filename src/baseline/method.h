@@ -1,6 +1,5 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <variant>
 
@@ -14,17 +13,15 @@
 
 namespace tomofield::baseline {
 
-/// The options of one of the methods. Each has facts() and json(), and an overload of
-/// reconstruct_with() in method.cc. A new method needs these and a line here.
+/// The options of one of the methods. Each has facts(), an overload of reconstruct_with() in
+/// method.cc, and one of fields_of() in baseline_record.cc. A new method needs these and a line
+/// here.
 using Method =
     std::variant<WbpOptions, SirtOptions, SartTvOptions, TvOptions, IngpOptions, FourierNetOptions>;
 
 MethodFacts facts_of(const Method& method);
 /// Returns the size of a method. Every voxel is a parameter unless its options have a size().
 MethodSize size_of(const Method& method, const projection::SampleGrid& grid, std::int64_t num_rows);
-/// Returns the name and every option.
-nlohmann::json json_of(const Method& method);
-
 /// Reconstructs with a method. `mean_density` is the specimen's, in density units.
 Solution reconstruct(VoxelProblem& problem, const Method& method, double mean_density,
                      const AfterIteration& after_iteration);

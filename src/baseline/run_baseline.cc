@@ -3,33 +3,32 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 
 #include "base/check.h"
 #include "base/log.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 #include "base/system/memory.h"
 #include "base/threads/parallel.h"
 #include "base/trace.h"
+#include "baseline/baseline_record.h"
 #include "baseline/tune.h"
 #include "baseline/voxel_problem.h"
-#include "io/json.h"
 #include "io/saving/output_files.h"
 #include "io/saving/scratch_memory.h"
 #include "kernels/lanes.h"
 #include "measurement/ctf_correction.h"
 #include "measurement/held_out.h"
+#include "measurement/prepare.h"
 #include "measurement/undecided_beads.h"
-#include "measurement/view_size.h"
 #include "measurement/view_transfers.h"
-#include "option_table/setting.h"
 #include "option_table/values.h"
-#include "output/metrics.h"
-#include "output/shared_options.h"
+#include "output/model_file.h"
+#include "output/output_paths.h"
 #include "output/volume.h"
 #include "projection/sample_grid.h"
+#include "tilt_series/series_plan.h"
 #include "tomofield/error.h"
 #include "tune/trial_measurement.h"
 
@@ -43,12 +42,6 @@ projection::SampleGrid grid_of(const measurement::Measurement& series,
   return projection::make_sample_grid(
       series.geometry, static_cast<double>(series.roi.x0), static_cast<double>(series.roi.x1),
       options.shared.field.with_margin ? options.shared.field.margin_spacing : 0.0);
-}
-
-bool fits_view_scale(const BaselineOptions& options) {
-  Options shared = options.shared;
-  option_table::choose_by_contrast(shared);
-  return *shared.fit.fit_view_scale;
 }
 
 // Estimates the memory: the volumes and detectors of the method, and a pair of slabs and its rays
@@ -105,57 +98,6 @@ output::VoxelSource voxels_of(const VoxelVolume& densities) {
   };
 }
 
-nlohmann::json options_json(const BaselineOptions& options) {
-  const Options& shared = options.shared;
-  const nlohmann::json all = option_table::to_json({options.files, shared});
-  return {{"input", all["input"]},
-          {"ctf_correction", base::name_of(options.ctf_correction)},
-          {"specimen", all["specimen"]},
-          {"with_margin", shared.field.with_margin},
-          {"margin_spacing", shared.field.margin_spacing},
-          {"fit_view_scale", fits_view_scale(options)},
-          {"hold_out", shared.fit.hold_out},
-          {"tune", shared.fit.tune},
-          {"method", json_of(options.method)}};
-}
-
-// Returns the error of the held-out views as JSON, or null if there are none.
-nlohmann::json held_out_json(const VoxelProblem& problem, const std::vector<int>& views,
-                             bool fit_view_scale, VoxelVolume& densities) {
-  if (views.empty()) return nullptr;
-  return measurement::report_held_out(held_out_errors(problem, views, fit_view_scale, densities),
-                                      problem.projector().geometry().tilt_deg);
-}
-
-nlohmann::json metrics_json(const Solution& solution, const VoxelProblem& problem,
-                            const measurement::Measurement& series, std::size_t num_parameters,
-                            double seconds) {
-  nlohmann::json views = nlohmann::json::array();
-  for (const int view : problem.views()) {
-    const std::size_t v = static_cast<std::size_t>(view);
-    views.push_back({{"tilt_deg", series.geometry.tilt_deg[v]},
-                     {"scale", problem.view_model(view).scale},
-                     {"offset", problem.view_model(view).offset * series.unit},
-                     {"noise_sigma", series.noise_sigma[v] * series.unit}});
-  }
-  for (std::size_t i = 0; i < solution.noise_sigma.size(); ++i)
-    views[i]["learned_noise_sigma"] = solution.noise_sigma[i] * series.unit;
-  std::vector<double> residuals;
-  for (const double loss : solution.data_loss)
-    residuals.push_back(2 * loss / static_cast<double>(problem.num_rays()));
-  return {{"parameters", num_parameters},
-          {"mean_squared_residual_per_noise_variance", residuals},
-          {"objective", solution.objective},
-          {"density_unit", series.unit},
-          {"pixel_size_A", series.pixel_size_A},
-          {"size_px", {series.roi.width(), series.roi.height(), series.geometry.thickness}},
-          {"seconds", seconds},
-          {"threads", base::thread_count()},
-          {"threads_why", base::describe_threads()},
-          {"mask", output::mask_json(series)},
-          {"views", views}};
-}
-
 AfterIteration report_to(const base::ProgressSink& progress, const MethodFacts& method,
                          std::int64_t num_rays) {
   return [&progress, method, num_rays, running = base::Stopwatch()](
@@ -174,16 +116,6 @@ void write_volume(const Solution& solution, const measurement::Measurement& seri
                path);
 }
 
-void write_results(const Solution& solution, const measurement::Measurement& series,
-                   const BaselineOptions& options, const nlohmann::json& metrics,
-                   const BaselinePaths& paths) {
-  write_volume(solution, series, options, paths.volume);
-  io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
-                              {"options", options_json(options)},
-                              {"origins", option_table::settings_json(options.shared.settings)},
-                              {"metrics", metrics}});
-}
-
 BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays,
                            const measurement::Measurement& series) {
   return {2 * solution.data_loss.back() / static_cast<double>(num_rays), last_decrease(solution),
@@ -196,7 +128,7 @@ measurement::Measurement prepare(const tilt_series::TiltSeries& tilt_series,
                                  const std::filesystem::path& scratch_dir) {
   measurement::Measurement series = measurement::prepare_measurement(
       tilt_series, options.shared.specimen, scratch_dir,
-      measurement::view_transfers(output::series_options(options.files, options.shared),
+      measurement::view_transfers(tilt_series::series_options(options.files, options.shared),
                                   options.shared.specimen.hand, tilt_series));
   if (series.transfers.empty()) return series;
   const base::TraceSpan span("correct contrast transfer");
@@ -208,31 +140,34 @@ measurement::Measurement prepare(const tilt_series::TiltSeries& tilt_series,
 
 }  // namespace
 
-BaselinePaths baseline_paths(const std::filesystem::path& volume) {
-  std::filesystem::path stem = volume;
-  stem.replace_extension();
-  return {volume, stem.string() + ".json", stem};
-}
-
 void check_options(const BaselineOptions& options) {
   constexpr const char* kAdvice = "give --overwrite to replace it, or another name with -o";
   base::require_no_faults(option_table::range_faults(options.shared));
   const auto faults = measurement::faults_of_transfer(options.files, options.shared.views);
   base::require_no_faults({faults.begin(), faults.end()});
   io::require_volume_name(options.shared.run.output);
-  const BaselinePaths paths = baseline_paths(options.shared.run.output);
-  io::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
-                         options.shared.run.overwrite, kAdvice);
+  const output::OutputPaths paths = output::output_paths(options.shared.run.output);
+  std::vector<std::filesystem::path> results = paths.pictures();
+  results.insert(results.end(), {paths.volume, paths.json});
+  io::check_output_files(results, io::input_files(options.files), options.shared.run.overwrite,
+                         kAdvice);
   if (options.shared.volume.zarr)
     output::check_zarr(paths.volume, options.shared.run.overwrite, kAdvice);
 }
 
+bool BaselineOptions::fits_view_scale() const {
+  Options chosen = shared;
+  option_table::choose_by_contrast(chosen);
+  return *chosen.fit.fit_view_scale;
+}
+
 std::vector<io::OutputLock> claim_outputs(const BaselineOptions& options) {
-  const BaselinePaths paths = baseline_paths(options.shared.run.output);
+  const output::OutputPaths paths = output::output_paths(options.shared.run.output);
   return io::claim_outputs({paths.volume, paths.json}, [&] { check_options(options); });
 }
 
-BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {
+BaselinePlan plan_baseline(const tilt_series::PlannedSeries& series,
+                           const BaselineOptions& options) {
   const measurement::Measurement planned =
       measurement::plan_measurement(series, options.shared.specimen);
   measurement::require_pixels(planned.geometry.width, planned.geometry.height);
@@ -270,20 +205,18 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
                              const BaselineOptions& requested, const BaselineProgress& progress) {
   base::log_info(base::describe_threads());
   BaselineOptions options = requested;
-  const BaselinePaths paths = baseline_paths(options.shared.run.output);
-  const bool fit_view_scale = fits_view_scale(options);
+  const output::OutputPaths paths = output::output_paths(options.shared.run.output);
+  const bool fit_view_scale = options.fits_view_scale();
   measurement::Measurement series =
       prepare(tilt_series, options, io::scratch_directory(paths.volume));
   keep_beads(series);  // as bright particles may be the specimen
   const std::vector<int> held_out =
       measurement::held_out_views(series.geometry.tilt_deg, options.shared.fit.hold_out);
-  nlohmann::json tuning = nullptr;
+  std::optional<Tuned> tuned;
   if (options.shared.fit.tune) {
-    const Tuned tuned =
-        tune(options.method, {series, grid_of(series, options), held_out, fit_view_scale},
-             progress.tuning);
-    tuning = tuning_json(tuned);
-    options.method = tuned.settings;
+    tuned = tune(options.method, {series, grid_of(series, options), held_out, fit_view_scale},
+                 progress.tuning);
+    options.method = tuned->settings;
   }
   VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays, series.noise_sigma,
                        {held_out, fit_view_scale});
@@ -296,11 +229,12 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   }();
   const double fit_seconds = running.seconds();
   const MethodSize size = size_of(options.method, problem.grid(), problem.num_rows());
-  nlohmann::json metrics =
-      metrics_json(solution, problem, series, size.num_parameters, fit_seconds);
-  metrics["held_out"] = held_out_json(problem, held_out, fit_view_scale, solution.densities);
-  metrics["tuning"] = tuning;
-  write_results(solution, series, options, metrics, paths);
+  std::optional<measurement::ViewErrors> errors;
+  if (!held_out.empty())
+    errors = held_out_errors(problem, held_out, fit_view_scale, solution.densities);
+  write_volume(solution, series, options, paths.volume);
+  write_record(paths.json, {options, series, problem, solution, size.num_parameters, fit_seconds,
+                            tuned, errors});
   return summary_of(solution, problem.num_rays(), series);
 }
 

@@ -24,13 +24,10 @@ struct BaselineOptions {
   Method method;
   /// Corrects the views before, if there is a contrast transfer.
   microscope::CtfCorrection ctf_correction = microscope::CtfCorrection::kFlip;
-};
 
-/// The files of a run, named after its volume.
-struct BaselinePaths {
-  std::filesystem::path volume, json, picture_prefix;
+  /// Returns whether the scales of views are fitted, which the contrast decides unless it is given.
+  bool fits_view_scale() const;
 };
-BaselinePaths baseline_paths(const std::filesystem::path& volume);
 
 /// Checks the options and the output files. Throws Error for options out of range, and if results
 /// would replace existing ones without `overwrite` or cannot be written.
@@ -53,7 +50,8 @@ struct BaselinePlan {
 
 /// Plans a run. Throws Error for options that do not fit the series, and if the machine has less
 /// memory than the run needs.
-BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options);
+BaselinePlan plan_baseline(const tilt_series::PlannedSeries& series,
+                           const BaselineOptions& options);
 
 /// The results of a run that the program prints.
 struct BaselineSummary {

@@ -4,17 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "base/log.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 #include "base/trace.h"
+#include "baseline/baseline_record.h"
 #include "baseline/voxel_problem.h"
 #include "tune/scores.h"
-#include "tune/trial_file.h"
 #include "tune/trial_measurement.h"
 
 namespace tomofield::baseline {
@@ -31,20 +30,6 @@ constexpr int kCutoffs = 7;      // candidates, each √2 times the one before
 // seemed better.
 constexpr double kAtMinimum = 0.01;
 constexpr int kMaxTrialIterations = 400;  // upper limit for trials that have not converged
-
-// Returns the settings that a tuning may change, as the command line writes them.
-std::string settings_text(const Method& method) {
-  const nlohmann::json json = json_of(method);
-  std::string text;
-  for (const char* key : {"penalty", "weight", "iterations", "cutoff"}) {
-    if (!json.contains(key)) continue;
-    const nlohmann::json& value = json[key];
-    text += fmt::format(
-        " --{} {}", key,
-        value.is_string() ? value.get<std::string>() : fmt::format("{:.4g}", value.get<double>()));
-  }
-  return text;
-}
 
 // Makes the runs of the trials and reports their progress.
 class TrialRuns {
@@ -239,7 +224,5 @@ Tuned tune(const Method& start, const TrialData& data, const base::ProgressSink&
   base::log_info(fmt::format("tuned:{}", settings_text(method)));
   return {method, trials.made(), runs.predicted_views()};
 }
-
-nlohmann::json tuning_json(const Tuned& tuned) { return tune::tuned_json(tuned, json_of); }
 
 }  // namespace tomofield::baseline

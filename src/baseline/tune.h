@@ -1,7 +1,6 @@
 #pragma once
 
 #include <concepts>
-#include <nlohmann/json_fwd.hpp>
 #include <vector>
 
 #include "base/progress.h"
@@ -50,8 +49,5 @@ struct TrialData {
 /// For `tv` it repeats all trials with more iterations until the chosen trial has converged. The
 /// result has the iterations of `start` all the same.
 Tuned tune(const Method& start, const TrialData& data, const base::ProgressSink& progress);
-
-/// Returns the chosen settings and every trial as JSON.
-nlohmann::json tuning_json(const Tuned& tuned);
 
 }  // namespace tomofield::baseline

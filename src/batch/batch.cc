@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "base/system/memory.h"
-#include "batch/faults.h"
 #include "batch/relion_table.h"
 #include "batch/series_list.h"
 #include "batch/slurm.h"

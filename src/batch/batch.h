@@ -7,7 +7,7 @@
 #include "batch/job.h"
 #include "batch/packing.h"
 #include "batch/planning.h"
-#include "batch/series.h"
+#include "batch/series_list.h"
 
 namespace tomofield::batch {
 

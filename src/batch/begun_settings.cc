@@ -6,8 +6,8 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "batch/read_json.h"
 #include "batch/slurm.h"
+#include "io/json.h"
 
 namespace tomofield::batch {
 
@@ -33,7 +33,7 @@ std::map<std::string, std::vector<std::string>> begun_settings(const fs::path& f
           shared_words(job.at("command").get<std::vector<std::string>>());
     return settings;
   };
-  return read_json(file, read, [&](const std::string& why) {
+  return io::read_record(file, read, [&](const std::string& why) {
     return fmt::format(
         "'{}' is not the list of a batch ({}), which says with what its series have begun: remove "
         "it, and these series take the choice of this batch, or start over with --overwrite",

@@ -9,9 +9,7 @@
 
 #include "base/plausible.h"
 #include "batch/begun_settings.h"
-#include "batch/read_json.h"
 #include "io/json.h"
-#include "io/json_numbers.h"
 #include "kernels/spikes.h"
 #include "tomofield/error.h"
 
@@ -154,7 +152,7 @@ std::vector<std::size_t> keep_begun_settings(const fs::path& folder,
 // Reads a file of a choice. Mistakes in it are errors that name it.
 template <typename Read>
 auto read_choice_file(const fs::path& file, const char* what, const Read& read) {
-  return read_json(file, read, [&](const std::string& why) {
+  return io::read_record(file, read, [&](const std::string& why) {
     return fmt::format("'{}' is not {} ({}): remove it, and the batch chooses again", file.string(),
                        what, why);
   });

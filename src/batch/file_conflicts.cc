@@ -6,8 +6,8 @@
 #include <string>
 
 #include "batch/choice.h"
-#include "batch/faults.h"
 #include "batch/relion_table.h"
+#include "batch/series_list.h"
 #include "batch/slurm.h"
 #include "batch/state.h"
 #include "batch/summary.h"
@@ -36,7 +36,7 @@ std::vector<fs::path> results_of(const Job& job) {
   if (!job.is_skipped) return job.files.results;
   const output::OutputPaths paths = output::output_paths(job.output);
   std::vector<fs::path> files{paths.volume, paths.model, paths.json, paths.report};
-  for (const fs::path& picture : io::picture_files(paths.picture_prefix)) files.push_back(picture);
+  for (const fs::path& picture : paths.pictures()) files.push_back(picture);
   return files;
 }
 

@@ -6,9 +6,7 @@
 
 #include "base/plausible.h"
 #include "base/utf8.h"
-#include "batch/read_json.h"
 #include "io/json.h"
-#include "io/json_numbers.h"
 #include "output/output_paths.h"
 #include "tomofield/error.h"
 
@@ -26,7 +24,7 @@ constexpr std::int64_t kMostTrials = 1 << 20;
 // Reads a plan or a list of jobs. Mistakes in it are errors that name the file.
 template <typename Read>
 auto read_job_file(const fs::path& file, const char* what, const Read& read) {
-  return read_json(file, read, [&](const std::string& why) {
+  return io::read_record(file, read, [&](const std::string& why) {
     return fmt::format("'{}' is not {}: {}", file.string(), what, why);
   });
 }

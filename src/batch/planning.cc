@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "base/system/child_process.h"
-#include "batch/faults.h"
 #include "batch/file_conflicts.h"
-#include "io/saving/scratch_folder.h"
+#include "batch/series_list.h"
+#include "io/saving/output_folder.h"
 
 namespace tomofield::batch {
 namespace {

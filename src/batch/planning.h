@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "batch/job.h"
-#include "batch/series.h"
-#include "option_table/given_option.h"
+#include "batch/series_list.h"
+#include "option_table/setting.h"
 
 namespace tomofield::batch {
 

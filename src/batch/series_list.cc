@@ -8,9 +8,9 @@
 #include <map>
 #include <optional>
 
+#include "base/log.h"
 #include "base/utf8.h"
 #include "batch/csv.h"
-#include "batch/faults.h"
 #include "io/tables/relion_star.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -224,6 +224,14 @@ void require_own_names(const std::vector<Series>& all) {
                              series.source, series.output.string()));
   }
   faults.require_none();
+}
+
+void Faults::require_none() const {
+  if (sentences_.empty()) return;
+  if (sentences_.size() == 1) throw Error(sentences_.front());
+  for (const std::string& sentence : sentences_) base::log_info(sentence);
+  throw Error(fmt::format("these {} mistakes are to be mended first; nothing was started",
+                          sentences_.size()));
 }
 
 }  // namespace tomofield::batch

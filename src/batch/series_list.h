@@ -5,9 +5,29 @@
 #include <string>
 #include <vector>
 
-#include "batch/series.h"
+#include "option_table/setting.h"
 
 namespace tomofield::batch {
+
+/// Collects the mistakes of all series of a batch, so that a user sees them at once.
+class Faults {
+ public:
+  void add(std::string sentence) { sentences_.push_back(std::move(sentence)); }
+  /// Throws Error if there is a mistake. Of several, logs each on a line of its own before.
+  void require_none() const;
+
+ private:
+  std::vector<std::string> sentences_;
+};
+
+/// One series of a batch, as a table or a pattern names it.
+struct Series {
+  std::string name;              ///< of its files and in the summary
+  std::string source;            ///< for messages: "line 3 of 'series.csv'"
+  std::filesystem::path input;   ///< what `reconstruct` takes
+  std::filesystem::path output;  ///< the tomogram; empty: NAME.mrc in the folder of the batch
+  std::vector<option_table::GivenOption> options;  ///< of this series alone
+};
 
 /// A column of a table names an option of `reconstruct`, which a table may or may not set.
 enum class ColumnKind {

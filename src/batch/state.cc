@@ -4,7 +4,6 @@
 
 #include "base/plausible.h"
 #include "io/json.h"
-#include "io/json_numbers.h"
 #include "tomofield/error.h"
 
 namespace tomofield::batch {

@@ -13,12 +13,12 @@
 #include <utility>
 
 #include "base/log.h"
-#include "base/time_text.h"
+#include "base/progress.h"
 #include "batch/choice.h"
 #include "batch/csv.h"
 #include "batch/relion_table.h"
 #include "batch/state.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_lock.h"
 #include "io/saving/output_set.h"
@@ -143,7 +143,7 @@ std::string mark_of(const Line& line) {
 
 std::vector<report::HtmlCell> page_row(const fs::path& folder, const Line& line) {
   const base::Costs& costs = line.state.costs;
-  const fs::path picture = output::output_paths(line.job->output).xy_picture;
+  const fs::path picture = output::output_paths(line.job->output).slice_pictures[0];
   report::HtmlCell shown{.text = {}, .mark = "picture"};
   if (fs::exists(picture)) shown.picture = fs::absolute(picture).lexically_proximate(folder);
   const bool has_run = costs.wall_seconds > 0;

@@ -13,11 +13,12 @@
 #include "base/range.h"
 #include "base/trace.h"
 #include "distributed/gathered_arrays.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "option_table/rows.h"
-#include "options/denoise_factor.h"
-#include "output/shared_options.h"
+#include "options/run_options.h"
+#include "output/model_file.h"
 #include "tomofield/error.h"
+#include "tune/trial_record.h"
 
 namespace tomofield::checkpoint {
 namespace {

@@ -2,34 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "base/log.h"
 #include "base/trace.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "output/model_file.h"
 #include "output/output_paths.h"
 #include "tomofield/error.h"
 
 namespace tomofield::checkpoint {
-namespace {
-
-constexpr double kLargestOfTile = 1e15;  // number that a record of a tile can have
-
-double rows_of(const nlohmann::json& tile) {
-  return tile.at("rows").at(1).get<double>() - tile.at("rows").at(0).get<double>();
-}
-
-compact::CompressionReport report_of(const nlohmann::json& tile) {
-  return tile.get<compact::CompressionReport>();
-}
-
-}  // namespace
 
 void forget_old_tiles(const options::ReconstructOptions& options,
                       const distributed::Communicator& processes) {
@@ -60,50 +44,26 @@ void FinishedTiles::read() {
   if (text("budget") != options_.field.budget)
     throw Error(fmt::format("'{}' was made with --budget {}: give the same", path, text("budget")));
   try {
-    tiles_ = io::parse_json(text("tiles"));
-    require_whole_tiles();
+    tiles_ = tiles_from(io::parse_json(text("tiles")), series_.roi.height());
   } catch (const std::exception& error) {
     throw Error(fmt::format("'{}' is damaged: {}", path, error.what()));
   }
   coded_ = std::move(model.coded);
 }
 
-// Throws unless the tiles lie side by side from the first row on, and leave rows for another one.
-void FinishedTiles::require_whole_tiles() const {
-  const std::int64_t region = series_.roi.height();
-  std::int64_t first = 0;
-  for (const nlohmann::json& tile : tiles_) {
-    const std::vector<double> rows =
-        io::numbers_at(tile, "rows", 0, static_cast<double>(region - 1));
-    if (rows.size() != 2 || rows[0] != static_cast<double>(first) || rows[1] <= rows[0] ||
-        rows[1] != std::floor(rows[1]))
-      throw Error("its tiles do not follow each other");
-    first = static_cast<std::int64_t>(rows[1]);
-    for (const char* key : {"residual", "seconds_fitting", "seconds_compressing", "variance",
-                            "mean_square_change", "decibels", "volume"})
-      io::number_at(tile, key, -kLargestOfTile, kLargestOfTile);
-    for (const char* key : {"parameters", "bytes"})
-      io::integer_at(tile, key, 0, std::int64_t{1} << 48);
-  }
-  if (first == 0) throw Error("it has no tiles");
-}
-
-void FinishedTiles::add(base::Range rows, TileCodes codes, nlohmann::json json) {
-  const compact::CompressionReport& report = codes.report;
-  json["seconds_compressing"] = codes.seconds;
-  json.update(report);
-  base::log_info(fmt::format("rows {} to {}: {} parameters in {} bytes", rows.begin, rows.end,
-                             report.parameters, report.bytes));
-  tiles_.push_back(std::move(json));
-  if (coded_ && !is_joinable(*coded_, codes.coded))
+void FinishedTiles::add(const FinishedTile& tile, compact::CodedField coded) {
+  base::log_info(fmt::format("rows {} to {}: {} parameters in {} bytes", tile.rows.begin,
+                             tile.rows.end, tile.report.parameters, tile.report.bytes));
+  if (coded_ && !is_joinable(*coded_, coded))
     throw Error(
         fmt::format("'{}' is damaged: its field does not end where its tiles do; "
                     "--overwrite starts over",
                     path_.string()));
+  tiles_.push_back(tile);
   if (coded_)
-    append(*coded_, codes.coded);
+    append(*coded_, coded);
   else
-    coded_ = std::move(codes.coded);
+    coded_ = std::move(coded);
 }
 
 void FinishedTiles::save() const {
@@ -114,7 +74,7 @@ void FinishedTiles::save() const {
                                     .integers = {{"fingerprint", as_numbers(origin_.fingerprint)},
                                                  {"budget", as_numbers(options_.field.budget)},
                                                  {"tile_rows", {origin_.tile_rows.value_or(0)}},
-                                                 {"tiles", as_numbers(tiles_.dump())}}};
+                                                 {"tiles", as_numbers(to_json(tiles_).dump())}}};
   output::save_coded(path_, *coded_, model_info(series_, options_), &state);
 }
 
@@ -123,27 +83,25 @@ void FinishedTiles::remove_file() const {
   std::filesystem::remove(path_, ignored);
 }
 
-int FinishedTiles::num_rows() const {
-  return tiles_.empty() ? 0 : tiles_.back().at("rows").at(1).get<int>();
-}
+int FinishedTiles::num_rows() const { return tiles_.empty() ? 0 : tiles_.back().rows.end; }
 
 compact::CompressionReport FinishedTiles::report() const {
-  compact::CompressionReport all = report_of(tiles_.front());
-  for (std::size_t i = 1; i < tiles_.size(); ++i) all = compact::joined(all, report_of(tiles_[i]));
+  compact::CompressionReport all = tiles_.front().report;
+  for (std::size_t i = 1; i < tiles_.size(); ++i) all = compact::joined(all, tiles_[i].report);
   return all;
 }
 
-double FinishedTiles::sum_of(const char* key) const {
+double FinishedTiles::sum_of(double FinishedTile::*number) const {
   double sum = 0;
-  for (const nlohmann::json& tile : tiles_) sum += tile.at(key).get<double>();
+  for (const FinishedTile& tile : tiles_) sum += tile.*number;
   return sum;
 }
 
-double FinishedTiles::mean_of(const char* key) const {
+double FinishedTiles::mean_of(double FinishedTile::*number) const {
   double sum = 0, rows = 0;
-  for (const nlohmann::json& tile : tiles_) {
-    sum += rows_of(tile) * tile.at(key).get<double>();
-    rows += rows_of(tile);
+  for (const FinishedTile& tile : tiles_) {
+    sum += tile.rows.size() * tile.*number;
+    rows += tile.rows.size();
   }
   return sum / rows;
 }

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
+#include <vector>
 
-#include "base/range.h"
 #include "checkpoint/checkpoint.h"
+#include "checkpoint/tile_record.h"
 #include "compact/coded_field.h"
 #include "compact/compress.h"
 #include "distributed/communicator.h"
@@ -13,13 +13,6 @@
 #include "options/run_options.h"
 
 namespace tomofield::checkpoint {
-
-/// The codes of the own rows of a tile.
-struct TileCodes {
-  compact::CodedField coded;
-  compact::CompressionReport report;
-  double seconds = 0.0;  ///< of the compression
-};
 
 /// Removes the tiles that an earlier run left: a run from the start replaces them, and a resumed
 /// one must not take them for its own.
@@ -35,9 +28,9 @@ class FinishedTiles {
   FinishedTiles(const options::ReconstructOptions& options, const measurement::Measurement& series,
                 const FitOrigin& origin);
 
-  /// Appends a tile: its own rows, counted from the first one of the region. `json` says how it was
-  /// fitted. Throws Error if it does not follow the tiles of the file, which somebody has changed.
-  void add(base::Range rows, TileCodes codes, nlohmann::json json);
+  /// Appends a tile and the codes of its own rows. Throws Error if it does not follow the tiles of
+  /// the file, which somebody has changed.
+  void add(const FinishedTile& tile, compact::CodedField coded);
   /// Writes the file, unless the run writes none.
   void save() const;
   void remove_file() const;
@@ -46,22 +39,21 @@ class FinishedTiles {
   const compact::CodedField& coded() const { return *coded_; }
   compact::CodedField take() { return std::move(*coded_); }
   compact::CompressionReport report() const;
-  const nlohmann::json& tiles_json() const { return tiles_; }
+  const std::vector<FinishedTile>& tiles() const { return tiles_; }
   /// Returns the sum of a number of all tiles, or its mean over their rows.
-  double sum_of(const char* key) const;
-  double mean_of(const char* key) const;
+  double sum_of(double FinishedTile::*number) const;
+  double mean_of(double FinishedTile::*number) const;
 
  private:
   bool writes_file() const { return !options_.run.output.empty(); }
   void read();
-  void require_whole_tiles() const;
 
   const options::ReconstructOptions& options_;
   const measurement::Measurement& series_;
   const FitOrigin& origin_;
   std::filesystem::path path_;
   std::optional<compact::CodedField> coded_;
-  nlohmann::json tiles_ = nlohmann::json::array();
+  std::vector<FinishedTile> tiles_;
 };
 
 }  // namespace tomofield::checkpoint

@@ -21,10 +21,10 @@ using testing::message_of;
 std::vector<std::int64_t> numbers_of(const std::string& text) { return {text.begin(), text.end()}; }
 
 json tile(int begin, int end) {
-  return {{"rows", {begin, end}}, {"residual", 1.0},           {"seconds_fitting", 2.0},
-          {"variance", 1.0},      {"mean_square_change", 0.1}, {"seconds_compressing", 1.0},
-          {"decibels", 0.1},      {"volume", 100.0},           {"parameters", 10},
-          {"bytes", 100}};
+  return {{"fitted_rows", {0, 128}},   {"held_out_error", nullptr},  {"rows", {begin, end}},
+          {"residual", 1.0},           {"seconds_fitting", 2.0},     {"variance", 1.0},
+          {"mean_square_change", 0.1}, {"seconds_compressing", 1.0}, {"decibels", 0.1},
+          {"volume", 100.0},           {"parameters", 10},           {"bytes", 100}};
 }
 
 // Writes tiles with right checksums, as somebody may have changed them, and reads them.
@@ -63,7 +63,7 @@ TEST_F(FinishedTilesTest, AreReadIfTheyAreWhole) {
   const FinishedTiles two = read(json::array({tile(0, 32), tile(32, 96)}));
   EXPECT_EQ(two.num_rows(), 96);
   EXPECT_EQ(two.report().bytes, 200u);
-  EXPECT_EQ(two.sum_of("seconds_fitting"), 4.0);
+  EXPECT_EQ(two.sum_of(&FinishedTile::seconds_fitting), 4.0);
 }
 
 TEST_F(FinishedTilesTest, AreRefusedIfSomebodyHasChangedThem) {
@@ -85,9 +85,8 @@ TEST_F(FinishedTilesTest, AreRefusedIfSomebodyHasChangedThem) {
 
 TEST_F(FinishedTilesTest, RefuseATileThatDoesNotFollowTheirField) {
   FinishedTiles tiles = read(json::array({tile(0, 64)}));
-  TileCodes same{.coded = *model_.coded, .report = {}};
   EXPECT_NE(message_of<Error>([&] {
-              tiles.add({64, 96}, same, {{"rows", {64, 96}}});
+              tiles.add({.rows = {64, 96}}, *model_.coded);
             }).find("run_tiles.h5"),
             std::string::npos);
 }

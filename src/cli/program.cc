@@ -1,5 +1,5 @@
 #include "cli/program.h"
-#include "base/system/program_path.h"
+#include "base/system/child_process.h"
 
 #include <fmt/format.h>
 
@@ -23,8 +23,6 @@
 #include "cli/options/project_arguments.h"
 #include "cli/options/unknown_options.h"
 #include "cli/terminal/console.h"
-#include "cli/terminal/exit_status.h"
-#include "cli/terminal/scratch_fault.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 

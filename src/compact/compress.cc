@@ -393,14 +393,6 @@ CompactField within(const Budget& budget, Compression& compression, const FileSi
 
 }  // namespace
 
-nlohmann::json report_json(const CompressionReport& report, double seconds) {
-  return {{"parameters", report.parameters},
-          {"bytes", report.bytes},
-          {"rms_change_over_deviation", std::sqrt(report.mean_square_change / report.variance)},
-          {"decibels", report.decibels},
-          {"seconds", seconds}};
-}
-
 CompressionReport joined(const CompressionReport& a, const CompressionReport& b) {
   CompressionReport both{
       .parameters = a.parameters + b.parameters,

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "base/range.h"
 #include "compact/budget.h"
@@ -25,13 +24,6 @@ struct CompressionReport {
   double decibels = 0.0;  ///< that the PSNR falls by, at most, on phantoms (docs/compact.md)
   double volume = 0.0;    ///< of the region, in cubic pixels
 };
-
-/// Reads and writes a report as JSON whose keys are the names of its members.
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CompressionReport, parameters, bytes, mean_square_change,
-                                   variance, decibels, volume)
-
-/// Returns the report for the metrics of a run; `seconds` is what the compression took.
-nlohmann::json report_json(const CompressionReport& report, double seconds);
 
 /// Returns the report of two parts of a field together.
 CompressionReport joined(const CompressionReport& a, const CompressionReport& b);

@@ -21,12 +21,12 @@
 #include "io/saving/output_folder.h"
 #include "io/saving/output_lock.h"
 #include "io/saving/output_set.h"
-#include "output/shared_options.h"
 #include "report/contrast.h"
 #include "report/curve_plot.h"
 #include "report/html.h"
 #include "report/pictures.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/measured_series.h"
+#include "tilt_series/series_plan.h"
 #include "tomofield/error.h"
 #include "tomofield/options.h"
 
@@ -184,9 +184,9 @@ void check_comparison(const CompareOptions& options) {
 }
 
 Outcome compare_methods(const CompareOptions& options, const RunHooks& hooks) {
-  tilt_series::TiltSeriesOptions checked = output::series_options(options.files, options.series);
-  checked.keep_views = false;  // the runs read them
-  const tilt_series::TiltSeries series(checked);
+  // Broken views are found before the runs, which read them.
+  const tilt_series::MeasuredSeries series(
+      tilt_series::series_options(options.files, options.series));
   const PlannedRuns plan = plan_runs(options, series);
   const io::OutputFolder folder(options.folder);
   const io::OutputLock lock(options.folder / "comparison.json");

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <string>
 
+#include "compare/pictures.h"
 #include "io/saving/output_files.h"
 #include "io/saving/output_target.h"
 #include "tomofield/error.h"
@@ -24,8 +25,8 @@ std::vector<fs::path> report_files(const CompareOptions& options) {
   std::vector<std::string> shown = names_of(options.methods);
   shown.emplace_back("truth");
   for (const std::string& name : shown) {
-    for (const char* suffix : {"_xy.png", "_xz.png", "_yz.png", "_detail.png"})
-      files.push_back(options.folder / "pictures" / (name + suffix));
+    for (const char* part : kPictureParts)
+      files.push_back(picture_path(options.folder / "pictures", name, part));
   }
   return files;
 }

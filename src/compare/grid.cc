@@ -6,7 +6,7 @@
 
 #include "evaluate/volume_pair.h"
 #include "io/images/mrc.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {

@@ -21,15 +21,20 @@ double standard_deviation(const report::Slice& plane, const Rectangle& d) {
   return std::sqrt(std::max(squares / n - sum / n * (sum / n), 0.0));
 }
 
-report::HtmlFigure figure(const Shown& volume, const report::Slice& slice, const char* suffix,
+report::HtmlFigure figure(const Shown& volume, const report::Slice& slice, const char* part,
                           const report::GreyScale& scale, const std::filesystem::path& folder) {
-  const std::filesystem::path path = folder / (volume.name + suffix + ".png");
+  const std::filesystem::path path = picture_path(folder, volume.name, part);
   const std::int64_t zoom = std::max<std::int64_t>(1, kPictureWidth / slice.width);
   report::write_slice_picture(path, slice, scale, zoom);
   return {path, volume.title};
 }
 
 }  // namespace
+
+std::filesystem::path picture_path(const std::filesystem::path& folder, const std::string& volume,
+                                   const std::string& part) {
+  return folder / (volume + "_" + part + ".png");
+}
 
 Rectangle busiest_detail(const report::Slice& plane) {
   const std::int64_t shorter = std::min(plane.width, plane.height);
@@ -54,10 +59,8 @@ std::vector<report::HtmlFigure> plane_figures(const std::vector<Shown>& volumes,
                                               const report::GreyScale& scale,
                                               const std::filesystem::path& folder) {
   std::vector<report::HtmlFigure> figures;
-  for (const Shown& volume : volumes) {
-    const report::Slice& slice = volume.planes[plane];
-    figures.push_back(figure(volume, slice, ("_" + slice.name).c_str(), scale, folder));
-  }
+  for (const Shown& volume : volumes)
+    figures.push_back(figure(volume, volume.planes[plane], kPictureParts[plane], scale, folder));
   return figures;
 }
 
@@ -70,7 +73,7 @@ std::vector<report::HtmlFigure> detail_figures(const std::vector<Shown>& volumes
   };
   std::vector<report::HtmlFigure> figures;
   for (const Shown& volume : volumes)
-    figures.push_back(figure(volume, cut(volume), "_detail", scale, folder));
+    figures.push_back(figure(volume, cut(volume), kPictureParts.back(), scale, folder));
   return figures;
 }
 

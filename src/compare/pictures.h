@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -17,6 +18,12 @@ struct Shown {
   std::string name, title;
   std::vector<report::Slice> planes;  ///< xy, xz, yz
 };
+
+/// The parts of a volume that are drawn: its central planes, and a detail of the first one.
+inline constexpr std::array kPictureParts{"xy", "xz", "yz", "detail"};
+/// Returns the file of such a picture.
+std::filesystem::path picture_path(const std::filesystem::path& folder, const std::string& volume,
+                                   const std::string& part);
 
 /// Returns the part of an xy plane that the report enlarges, in voxels: the square with the largest
 /// standard deviation on a lattice of half its side. Its side is a third of the plane's shorter

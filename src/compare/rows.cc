@@ -11,7 +11,7 @@
 #include "base/utf8.h"
 #include "compare/grid.h"
 #include "io/json.h"
-#include "io/json_numbers.h"
+#include "output/output_paths.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {
@@ -25,18 +25,11 @@ constexpr const char* kAdvice =
 
 // Returns what `read` makes of a JSON file. Mistakes in the file are errors that name it.
 template <typename Read>
-auto read_json(const fs::path& path, Read&& read) {
-  const auto fail = [&](const std::string& why) {
-    return Error(fmt::format("'{}' is not what this comparison wrote ({}): {}", path.string(), why,
-                             kAdvice));
-  };
-  try {
-    return read(io::read_json(path));
-  } catch (const json::exception& fault) {
-    throw fail(io::fault_text(fault));
-  } catch (const Error& fault) {
-    throw fail(fault.what());
-  }
+auto read_json(const fs::path& path, const Read& read) {
+  return io::read_record(path, read, [&](const std::string& why) {
+    return fmt::format("'{}' is not what this comparison wrote ({}): {}", path.string(), why,
+                       kAdvice);
+  });
 }
 
 std::string command_text(const json& command) {
@@ -72,16 +65,17 @@ std::vector<std::string> changes(const json& before, const json& now) {
   return all;
 }
 
-// Returns the path FOLDER/NAME with a suffix.
-fs::path file_of(const Row& row, const char* suffix) {
-  return row.volume.parent_path() / (row.run.name + suffix);
-}
+// Returns the files of the run, and those in which the comparison keeps its state and all that it
+// said.
+output::OutputPaths paths_of(const Row& row) { return output::output_paths(row.volume); }
+fs::path state_of(const Row& row) { return fs::path(row.volume).replace_extension(".row.json"); }
+fs::path log_of(const Row& row) { return fs::path(row.volume).replace_extension(".log"); }
 
 // Returns true if there is a checkpoint, or trials of a tuning that was stopped.
 bool can_resume(const Row& row) {
   if (!row.run.method.resumes) return false;
-  return fs::exists(file_of(row, ".h5")) ||
-         (row.state.progress != Progress::kFinished && fs::exists(file_of(row, "_tune.json")));
+  return fs::exists(paths_of(row).model) ||
+         (row.state.progress != Progress::kFinished && fs::exists(paths_of(row).trials));
 }
 
 // Returns the costs of earlier sessions that count towards the costs of a run.
@@ -98,14 +92,14 @@ base::Costs costs_until_now(const Row& row) {
 
 // Runs one method. Returns false if it was stopped.
 bool run(const fs::path& program, const RunHooks& hooks, Row& row) {
-  const fs::path log = file_of(row, ".log");
+  const fs::path log = log_of(row);
   const std::vector<std::string> command = full_command(program, row, row.volume);
   // The fit is finished; only the volume is written again.
   const bool is_paid = can_resume(row) && row.state.progress == Progress::kFinished;
   const auto keep = [&](Progress progress, const base::Costs& costs) {
     if (is_paid) return;
     row.state = {progress, costs};
-    write_row(file_of(row, ".row.json"), row.origin, row.state);
+    write_row(state_of(row), row.origin, row.state);
   };
   const base::Costs before = is_paid ? row.state.costs : costs_until_now(row);
   keep(Progress::kRunning, before);
@@ -176,13 +170,13 @@ std::vector<Row> new_rows(const std::vector<Run>& runs, const fs::path& folder) 
 
 std::vector<Row> stored_rows(const std::vector<Run>& runs, const fs::path& folder) {
   std::vector<Row> rows = new_rows(runs, folder);
-  for (Row& row : rows) row.state = read_row(file_of(row, ".row.json"), row.origin);
+  for (Row& row : rows) row.state = read_row(state_of(row), row.origin);
   return rows;
 }
 
 bool is_done(const Row& row) {
   return row.state.progress == Progress::kFinished && fs::exists(row.volume) &&
-         fs::exists(file_of(row, ".json"));
+         fs::exists(paths_of(row).json);
 }
 
 std::vector<std::string> full_command(const fs::path& program, const Row& row,
@@ -195,11 +189,12 @@ std::vector<std::string> full_command(const fs::path& program, const Row& row,
 }
 
 std::vector<fs::path> files_of(const Row& row) {
-  std::vector<fs::path> files;
-  for (const char* suffix :
-       {".row.json", ".log", ".mrc", ".h5", ".json", "_tune.json", "_xy.png", "_xz.png", "_yz.png",
-        "_mask.png", "_tree.png", "_held_out.png", "_choice.png", "_report.html"})
-    files.push_back(file_of(row, suffix));
+  const output::OutputPaths paths = paths_of(row);
+  std::vector<fs::path> files{
+      state_of(row),        log_of(row),  paths.volume,       paths.model,
+      paths.json,           paths.trials, paths.tree_picture, paths.held_out_picture,
+      paths.choice_picture, paths.report};
+  for (const fs::path& picture : paths.pictures()) files.push_back(picture);
   return files;
 }
 
@@ -209,7 +204,7 @@ bool run_rows(const fs::path& program, const RunHooks& hooks, std::vector<Row>& 
     if (!is_there && hooks.must_stop()) return false;
     if (hooks.run_starts) hooks.run_starts(row.run, is_there);
     if (!is_there && !run(program, hooks, row)) return false;
-    row.metrics = read_metrics(file_of(row, ".json"));
+    row.metrics = read_metrics(paths_of(row).json);
     require_one_grid({rows.front().run.name, read_grid(rows.front().volume)},
                      {row.run.name, read_grid(row.volume)});
   }

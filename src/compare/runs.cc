@@ -13,7 +13,7 @@
 #include "evaluate/box.h"
 #include "io/is_file.h"
 #include "io/saving/output_files.h"
-#include "io/saving/scratch_folder.h"
+#include "io/saving/output_folder.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
@@ -38,7 +38,7 @@ const char* suffix_of(Purpose purpose) {
 
 // Returns the 1-based sections that are left out: the user's, and every second one of the rest.
 std::string excluded(Purpose purpose, const CompareOptions& options,
-                     const tilt_series::TiltSeries& series) {
+                     const tilt_series::PlannedSeries& series) {
   std::string sections = options.series.views.exclude;
   if (purpose != Purpose::kOddViews && purpose != Purpose::kEvenViews) return sections;
   const std::size_t first = purpose == Purpose::kOddViews ? 1 : 0;
@@ -116,7 +116,7 @@ void require_places_within(const CompareOptions& options, const Grid& grid) {
 
 }  // namespace
 
-PlannedRuns plan_runs(const CompareOptions& options, const tilt_series::TiltSeries& series) {
+PlannedRuns plan_runs(const CompareOptions& options, const tilt_series::PlannedSeries& series) {
   PlannedRuns plan{{Purpose::kVolume}, {}};
   if (options.halves)
     plan.purposes.insert(plan.purposes.end(), {Purpose::kOddViews, Purpose::kEvenViews});

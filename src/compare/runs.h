@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "compare/comparison.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/planned_series.h"
 
 namespace tomofield::compare {
 
@@ -18,7 +18,7 @@ struct PlannedRuns {
   std::vector<Purpose> purposes;
   std::vector<Run> runs;  ///< [purpose][method]
 };
-PlannedRuns plan_runs(const CompareOptions& options, const tilt_series::TiltSeries& series);
+PlannedRuns plan_runs(const CompareOptions& options, const tilt_series::PlannedSeries& series);
 
 /// Finds out before the first run what would stop a comparison later. Runs the commands of all
 /// unfinished rows with --dry-run, and compares the grids of the volumes with the first one's and

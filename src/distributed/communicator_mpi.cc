@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "base/check.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 
 namespace tomofield::distributed {
 namespace {

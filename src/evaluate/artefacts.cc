@@ -6,6 +6,7 @@
 
 #include "evaluate/speckle.h"
 #include "output/model_file.h"
+#include "output/output_paths.h"
 #include "output/volume.h"
 #include "tomofield/error.h"
 
@@ -35,7 +36,7 @@ void require_fit(const output::ModelOutline& model, const fs::path& path,
 // Returns the outline of the model beside a volume if it belongs to the volume.
 std::optional<output::ModelOutline> model_beside(const fs::path& volume,
                                                  const base::Shape3& shape) {
-  const fs::path path = fs::path(volume).replace_extension(".h5");
+  const fs::path path = output::output_paths(volume).model;
   if (!fs::exists(path)) return std::nullopt;
   try {
     output::ModelOutline model = output::load_outline(path);
@@ -59,16 +60,6 @@ Artefacts find_artefacts(const base::Volume& volume, const fs::path& path,
   }
   if (outline) found.faces = face_jump(volume, LeafFaces(outline->tree, outline->roi));
   return found;
-}
-
-nlohmann::json artefacts_json(const std::optional<double>& speckle,
-                              const std::optional<FaceJump>& faces) {
-  const auto value = [](const std::optional<double>& number) {
-    return number ? nlohmann::json(*number) : nlohmann::json(nullptr);
-  };
-  nlohmann::json jump = nullptr;
-  if (faces) jump = {{"both", faces->both}, {"x", value(faces->x)}, {"y", value(faces->y)}};
-  return {{"speckle", value(speckle)}, {"face_jump", jump}};
 }
 
 }  // namespace tomofield::evaluate

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "base/volume.h"
@@ -21,9 +20,5 @@ struct Artefacts {
 /// cannot be read or has another geometry.
 Artefacts find_artefacts(const base::Volume& volume, const std::filesystem::path& path,
                          const std::optional<std::filesystem::path>& model);
-
-/// Returns {speckle, face_jump: {both, x, y}}; what there is not is null.
-nlohmann::json artefacts_json(const std::optional<double>& speckle,
-                              const std::optional<FaceJump>& faces);
 
 }  // namespace tomofield::evaluate

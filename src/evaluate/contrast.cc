@@ -146,21 +146,4 @@ Regions choose_regions(const base::Volume& volume) {
   return {{cubes[foreground]}, {cubes[background]}};
 }
 
-nlohmann::json contrast_json(const ContrastScore& score, const Regions& regions) {
-  const auto boxes = [](const std::vector<base::Box>& all) {
-    nlohmann::json list = nlohmann::json::array();
-    for (const base::Box& box : all) list.push_back(to_text(box));
-    return list;
-  };
-  return {{"cnr", score.cnr},
-          {"enl", score.enl},
-          {"foreground", boxes(regions.foreground)},
-          {"background", boxes(regions.background)},
-          {"foreground_mean", score.foreground_mean},
-          {"foreground_deviation", score.foreground_deviation},
-          {"background_mean", score.background_mean},
-          {"background_deviation", score.background_deviation},
-          {"normalised_from", {score.low, score.high}}};
-}
-
 }  // namespace tomofield::evaluate

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "base/volume.h"
@@ -38,7 +37,5 @@ ContrastScore contrast_score(const base::Volume& volume, const Regions& regions)
 /// choice favours whatever the volume shows best, so compare several volumes on the regions of one
 /// of them. Throws Error for fewer than 8 cubes and for voxels that are not finite.
 Regions choose_regions(const base::Volume& volume);
-
-nlohmann::json contrast_json(const ContrastScore& score, const Regions& regions);
 
 }  // namespace tomofield::evaluate

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/volume.h"
-#include "evaluate/voxel_block.h"
+#include "evaluate/speckle.h"
 #include "field/tree/quadtree.h"
 #include "tomofield/options.h"
 

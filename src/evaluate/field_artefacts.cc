@@ -8,7 +8,6 @@
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/speckle.h"
-#include "evaluate/voxel_block.h"
 #include "field/sampling/aligned_rows.h"
 #include "field/sampling/sample_box.h"
 #include "kernels/lanes.h"

@@ -182,20 +182,4 @@ VolumeScore score_volume(const VolumeScoreOptions& options) {
   return score;
 }
 
-nlohmann::json volume_score_json(const VolumeScore& score, const VolumeScoreOptions& options) {
-  nlohmann::json views = nlohmann::json::array();
-  for (std::size_t v = 0; v < score.errors.views.size(); ++v) {
-    views.push_back({{"view", score.errors.views[v]},
-                     {"tilt_deg", score.tilt_deg[v]},
-                     {"error", score.errors.view_error[v]},
-                     {"noise_sigma", score.unit / std::sqrt(score.errors.models[v].weight)},
-                     {"scale", score.errors.models[v].scale * score.unit},
-                     {"offset", score.errors.models[v].offset * score.unit}});
-  }
-  return {{"series", base::utf8_text(options.input.stack.string())},
-          {"hold_out", options.hold_out},
-          {"error", score.errors.total},
-          {"views", views}};
-}
-
 }  // namespace tomofield::evaluate

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <vector>
 
@@ -52,8 +51,5 @@ struct VolumeScore {
 /// Computes the reprojection error of a volume (reprojection_errors()). Throws Error for a volume
 /// that is not of the region of interest, and for a series that read_tilt_series() refuses.
 VolumeScore score_volume(const VolumeScoreOptions& options);
-
-/// Returns the score as JSON. Noise, scales and offsets are in the units of the stack.
-nlohmann::json volume_score_json(const VolumeScore& score, const VolumeScoreOptions& options);
 
 }  // namespace tomofield::evaluate

@@ -123,10 +123,4 @@ DetectionScore membrane_score(const base::Volume& volume, const base::Volume& la
   return score_detections(std::move(voxels), num_true);
 }
 
-nlohmann::json membrane_json(const DetectionScore& score, const std::filesystem::path& label) {
-  return {{"label", base::utf8_text(label.string())},
-          {"best_dice", score.best_dice},
-          {"average_precision", score.average_precision}};
-}
-
 }  // namespace tomofield::evaluate

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "base/volume.h"
 #include "evaluate/matching/detection.h"
@@ -20,8 +19,5 @@ base::Volume sheet_response(const base::Volume& volume, double sigma_px);
 /// have the same shape. The blur is 20 Å, about the optimum for a bilayer of 50 Å. Throws Error for
 /// a label without membranes, and for an unknown voxel size.
 DetectionScore membrane_score(const base::Volume& volume, const base::Volume& label);
-
-/// Does so with two MRC files, read as a pair (volume_pair.h), and returns the score as JSON.
-nlohmann::json membrane_json(const DetectionScore& score, const std::filesystem::path& label);
 
 }  // namespace tomofield::evaluate

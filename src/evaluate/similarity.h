@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <span>
 
 #include "base/volume.h"
@@ -51,10 +50,5 @@ struct Comparison {
 /// Scores the first volume of a pair against the second, the truth. The peak of the PSNR is the
 /// truth's.
 Comparison compare(const VolumePair& pair);
-
-/// Returns the comparison as JSON. An infinite PSNR is written as null.
-nlohmann::json comparison_json(const Comparison& comparison,
-                               const std::filesystem::path& reconstruction,
-                               const std::filesystem::path& truth);
 
 }  // namespace tomofield::evaluate

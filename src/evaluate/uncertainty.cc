@@ -1,5 +1,6 @@
 #include "evaluate/uncertainty.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -11,7 +12,7 @@
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/box.h"
-#include "evaluate/map_like.h"
+#include "tomofield/version.h"
 
 namespace tomofield::evaluate {
 namespace {
@@ -101,6 +102,16 @@ void write_uncertainty(const std::filesystem::path& first, const std::filesystem
     map.write_section(z, error);
   }
   map.close();
+}
+
+io::MrcSpec map_like(const io::MrcHeader& header, const std::string& what) {
+  return {.nx = header.nx,
+          .ny = header.ny,
+          .nz = header.nz,
+          .mode = io::MrcMode::kFloat32,
+          .voxel_size_A = header.voxel_size_A,
+          .origin_A = header.origin_A,
+          .labels = {fmt::format("tomofield {}: {}", library_version(), what)}};
 }
 
 }  // namespace tomofield::evaluate

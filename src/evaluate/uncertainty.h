@@ -2,6 +2,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
+
+#include "io/images/mrc.h"
 
 namespace tomofield::evaluate {
 
@@ -15,5 +18,8 @@ constexpr std::int64_t kUncertaintyBox = 7;
 /// σ / √2, the standard deviation of (a + b) / 2. A box of sections is in memory at a time.
 void write_uncertainty(const std::filesystem::path& first, const std::filesystem::path& second,
                        const std::filesystem::path& path);
+
+/// Returns a float volume with the size, the voxel size and the origin of another one.
+io::MrcSpec map_like(const io::MrcHeader& header, const std::string& what);
 
 }  // namespace tomofield::evaluate

@@ -6,7 +6,7 @@
 #include "output/alignment_files.h"
 #include "output/output_paths.h"
 #include "report/alignment_plot.h"
-#include "tilt_series/open_views.h"
+#include "tilt_series/planned_series.h"
 #include "tomofield/error.h"
 
 namespace tomofield::exchange {
@@ -33,7 +33,7 @@ std::vector<io::OutputLock> claim_alignment(const options::ReconstructOptions& o
   });
 }
 
-void write_alignment_results(const tilt_series::TiltSeries& series,
+void write_alignment_results(const tilt_series::PlannedSeries& series,
                              const options::ReconstructOptions& options) {
   if (options.run.align == Alignment::kOff) return;
   const auto stack = tilt_series::open_views(options.input());
@@ -41,7 +41,7 @@ void write_alignment_results(const tilt_series::TiltSeries& series,
   output::write_alignment_files(
       series, {header.nx, header.ny, header.nz},
       output::alignment_files(output::output_paths(options.run.output).alignment_prefix));
-  report::write_alignment_picture(report::alignment_curves(options.alignment),
+  report::write_alignment_picture(report::alignment_curves(*options.alignment),
                                   output::output_paths(options.run.output).alignment_picture);
   write_relion_alignment(series, options);
 }

@@ -5,7 +5,7 @@
 
 #include "io/saving/output_lock.h"
 #include "options/run_options.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/planned_series.h"
 
 namespace tomofield::exchange {
 
@@ -18,7 +18,7 @@ std::vector<std::filesystem::path> alignment_results(const options::ReconstructO
 std::vector<io::OutputLock> claim_alignment(const options::ReconstructOptions& options);
 
 /// Writes them for an aligned series (realign/aligned_series.h).
-void write_alignment_results(const tilt_series::TiltSeries& series,
+void write_alignment_results(const tilt_series::PlannedSeries& series,
                              const options::ReconstructOptions& options);
 
 }  // namespace tomofield::exchange

@@ -23,7 +23,7 @@ std::vector<std::filesystem::path> exchange_files(const options::ReconstructOpti
   return files;
 }
 
-void write_exchange_files(const tilt_series::TiltSeries& series,
+void write_exchange_files(const tilt_series::PlannedSeries& series,
                           const options::ReconstructOptions& options,
                           const std::filesystem::path& volume) {
   const base::TraceSpan span("write files for other programs");

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "options/run_options.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/planned_series.h"
 
 namespace tomofield::exchange {
 
@@ -17,7 +17,7 @@ std::vector<std::filesystem::path> volume_descriptions(const options::Reconstruc
 std::vector<std::filesystem::path> exchange_files(const options::ReconstructOptions& options);
 
 /// Writes them. The volume's contents are in the file `volume` (Results, WriteMore).
-void write_exchange_files(const tilt_series::TiltSeries& series,
+void write_exchange_files(const tilt_series::PlannedSeries& series,
                           const options::ReconstructOptions& options,
                           const std::filesystem::path& volume);
 

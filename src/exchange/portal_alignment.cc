@@ -36,7 +36,7 @@ Place place_of(const io::MrcHeader& header, VolumeAxes axes, double thickness_A)
   return place;
 }
 
-json section_json(const tilt_series::TiltSeries& series, std::size_t index, int hand) {
+json section_json(const tilt_series::PlannedSeries& series, std::size_t index, int hand) {
   const tilt_series::View& view = series.views()[index];
   const geometry::RawFromAligned m = series.raw_from_aligned(index);
   return {{"z_index", view.section},
@@ -49,7 +49,7 @@ json section_json(const tilt_series::TiltSeries& series, std::size_t index, int 
 
 }  // namespace
 
-json portal_alignment(const tilt_series::TiltSeries& series,
+json portal_alignment(const tilt_series::PlannedSeries& series,
                       const options::ReconstructOptions& options, const fs::path& volume) {
   const SpecimenOptions& specimen = options.specimen;
   const double pixel_A = series.pixel_size_A() / series.bin_factor();

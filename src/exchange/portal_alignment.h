@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "options/run_options.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/planned_series.h"
 
 namespace tomofield::exchange {
 
@@ -18,7 +18,7 @@ namespace tomofield::exchange {
 /// Views that were left out are not in it. The sizes are those of the volume whose contents are in
 /// the file `volume`, in Å; volume_offset is its middle relative to the middle of the aligned view
 /// and the tilt axis. A volume that is mirrored in Z has the angles with the sign turned.
-nlohmann::json portal_alignment(const tilt_series::TiltSeries& series,
+nlohmann::json portal_alignment(const tilt_series::PlannedSeries& series,
                                 const options::ReconstructOptions& options,
                                 const std::filesystem::path& volume);
 

@@ -9,7 +9,7 @@
 #include "io/saving/atomic_file.h"
 #include "io/tables/relion_star.h"
 #include "io/tables/view_table.h"
-#include "tilt_series/open_views.h"
+#include "tilt_series/planned_series.h"
 #include "tilt_series/section_table.h"
 
 namespace tomofield::exchange {
@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 namespace {
 
 // Returns how a view of the series is aligned, in pixels before binning.
-tilt_series::AlignedSection aligned_section(const tilt_series::TiltSeries& series,
+tilt_series::AlignedSection aligned_section(const tilt_series::PlannedSeries& series,
                                             std::size_t view) {
   const tilt_series::View& seen = series.views()[view];
   const geometry::RawFromAligned map =
@@ -35,7 +35,7 @@ std::optional<fs::path> relion_alignment(const options::ReconstructOptions& opti
   return output::output_paths(options.run.output).alignment_star;
 }
 
-void write_relion_alignment(const tilt_series::TiltSeries& series,
+void write_relion_alignment(const tilt_series::PlannedSeries& series,
                             const options::ReconstructOptions& options) {
   const std::optional<fs::path> path = relion_alignment(options);
   if (!path) return;

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "options/run_options.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/planned_series.h"
 
 namespace tomofield::exchange {
 
@@ -14,7 +14,7 @@ std::optional<std::filesystem::path> relion_alignment(const options::Reconstruct
 
 /// Writes it: the rows of the views of the aligned series with all their columns, and the angles
 /// and shifts of the new alignment. RELION has no magnifications, so they are lost.
-void write_relion_alignment(const tilt_series::TiltSeries& series,
+void write_relion_alignment(const tilt_series::PlannedSeries& series,
                             const options::ReconstructOptions& options);
 
 }  // namespace tomofield::exchange

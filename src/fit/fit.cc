@@ -14,7 +14,6 @@
 #include "field/vm/factorise.h"
 #include "measurement/noise_fit.h"
 #include "measurement/surrogate_views.h"
-#include "objective/noise_scale.h"
 #include "objective/ray_data_term.h"
 #include "objective/slab_objective.h"
 #include "objective/terms.h"

@@ -1,10 +1,11 @@
+#include "fourier/real_transform.h"
+
 #include <fftw3.h>
 
 #include <memory>
 
 #include "base/check.h"
 #include "fourier/fftw_plan.h"
-#include "fourier/real_transform.h"
 
 namespace tomofield::fourier {
 

@@ -1,10 +1,11 @@
+#include "fourier/real_transform.h"
+
 #include <algorithm>
 #include <complex>
 #include <memory>
 
 #include "base/check.h"
 #include "fourier/image_transform.h"
-#include "fourier/real_transform.h"
 
 namespace tomofield::fourier {
 

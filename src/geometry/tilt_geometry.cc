@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 namespace tomofield::geometry {
@@ -57,6 +58,13 @@ TiltGeometry centred_geometry(std::int64_t width, std::int64_t height, double th
   g.axis_x = static_cast<double>(width) / 2;
   g.axis_z = thickness / 2;
   return g;
+}
+
+std::vector<std::size_t> order_of_tilts(std::span<const double> tilt_deg) {
+  std::vector<std::size_t> order(tilt_deg.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t view) { return tilt_deg[view]; });
+  return order;
 }
 
 }  // namespace tomofield::geometry

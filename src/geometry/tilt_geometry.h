@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace tomofield::geometry {
@@ -48,5 +50,8 @@ struct TiltGeometry {
 /// Returns the geometry whose tilt axis passes through the geometric centres, with hand +1.
 TiltGeometry centred_geometry(std::int64_t width, std::int64_t height, double thickness,
                               std::vector<double> tilt_deg);
+
+/// Returns the numbers of the views in order of tilt. Views of one tilt keep their order.
+std::vector<std::size_t> order_of_tilts(std::span<const double> tilt_deg);
 
 }  // namespace tomofield::geometry

@@ -1,4 +1,4 @@
-#include "io/json_numbers.h"
+#include "io/json.h"
 
 #include <gtest/gtest.h>
 

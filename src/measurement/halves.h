@@ -7,7 +7,7 @@
 #include "distributed/communicator.h"
 #include "measurement/measurement.h"
 #include "measurement/view_residuals.h"
-#include "tilt_series/half.h"
+#include "tilt_series/half_stacks.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::measurement {

@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/aligned_buffer.h"
 #include "base/log.h"
 #include "base/threads/parallel.h"
-#include "geometry/tilt_order.h"
+#include "geometry/tilt_geometry.h"
 #include "kernels/lanes.h"
 #include "tomofield/error.h"
 
@@ -118,19 +117,6 @@ ViewErrors held_out_error(const projection::SlabSampler& sampler,
                           bool fit_view_scale, const distributed::Communicator& processes) {
   const SlabSums sums = sums_of_slabs(sampler, projector, measured, views, processes);
   return view_errors(std::move(views), sums, noise_weight, fit_view_scale);
-}
-
-nlohmann::json report_held_out(const ViewErrors& error, const std::vector<double>& tilt_deg,
-                               bool stopped_by_them) {
-  base::log_info(fmt::format(
-      "held out: {} views, error {:.4f}{}", error.views.size(), error.total,
-      stopped_by_them ? " (they also chose when to stop, so others are predicted less well)" : ""));
-  nlohmann::json views = nlohmann::json::array();
-  for (std::size_t i = 0; i < error.views.size(); ++i) {
-    const auto view = static_cast<std::size_t>(error.views[i]);
-    views.push_back({{"view", view}, {"tilt_deg", tilt_deg[view]}, {"error", error.view_error[i]}});
-  }
-  return {{"error", error.total}, {"independent", !stopped_by_them}, {"views", views}};
 }
 
 std::vector<PredictedView> predicted_views(const projection::SlabSampler& sampler,

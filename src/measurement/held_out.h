@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <vector>
 
@@ -27,11 +26,6 @@ ViewErrors held_out_error(
     const SlabViews& measured, std::vector<int> views, std::span<const double> noise_weight,
     bool fit_view_scale,
     const distributed::Communicator& processes = distributed::Communicator::alone());
-
-/// Logs the error; returns it and that of each view, for the metrics of a run. With
-/// `stopped_by_them` the same views decided when the fit stopped, and both say so.
-nlohmann::json report_held_out(const ViewErrors& error, const std::vector<double>& tilt_deg,
-                               bool stopped_by_them = false);
 
 /// A view as measured and as a field predicts it: [y, x], rows of the region of
 /// interest; NaN where there is no measurement.

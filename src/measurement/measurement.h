@@ -48,7 +48,6 @@ struct Measurement {
   double pixel_size_A = 1.0;
   double bin_factor = 1.0;  ///< of `pixel_size_A` to the stack's
   double x_tilt_deg = 0.0;  ///< the same for every view: a rotation of the volume about X
-  double empty_beam = 0.0;  ///< I0 in data units (dark contrast)
   /// The brightness of the emptiest places of a bright series, in density units times pixels, which
   /// the rays still contain (background.h); 0 if it is small beside the specimen's.
   double background = 0.0;

@@ -15,10 +15,9 @@
 #include "base/trace.h"
 #include "measurement/read_rays.h"
 #include "measurement/view_units.h"
+#include "tilt_series/own_views.h"
 #include "tilt_series/resampling/align_image.h"
 #include "tilt_series/resampling/align_means.h"
-#include "tilt_series/view_owner.h"
-#include "tilt_series/views_at_once.h"
 #include "tomofield/error.h"
 
 namespace tomofield::measurement {
@@ -88,7 +87,7 @@ void check_axis(const geometry::TiltGeometry& g, double factor) {
 }
 
 // Returns how the views as recorded look at the specimen.
-geometry::RayGeometry ray_geometry(const tilt_series::TiltSeries& series,
+geometry::RayGeometry ray_geometry(const tilt_series::PlannedSeries& series,
                                    const geometry::TiltGeometry& aligned) {
   geometry::RayGeometry g;
   g.aligned = aligned;
@@ -277,7 +276,7 @@ std::vector<std::string> faults_of(const SpecimenOptions& specimen) {
   return found;
 }
 
-std::size_t decoding_memory(const tilt_series::TiltSeries& series, const Measurement& plan,
+std::size_t decoding_memory(const tilt_series::PlannedSeries& series, const Measurement& plan,
                             const distributed::Communicator& processes) {
   const std::size_t of_view = series.decoding_memory();
   const std::size_t num_views =
@@ -286,13 +285,12 @@ std::size_t decoding_memory(const tilt_series::TiltSeries& series, const Measure
   return num_views * of_view + SlabViews::filling_memory(plan.rays_shape());
 }
 
-Measurement plan_measurement(const tilt_series::TiltSeries& series,
+Measurement plan_measurement(const tilt_series::PlannedSeries& series,
                              const SpecimenOptions& specimen) {
   base::require_no_faults(faults_of(specimen));
   Measurement plan;
   plan.bin_factor = series.bin_factor();
   plan.pixel_size_A = series.pixel_size_A();
-  plan.empty_beam = series.empty_beam();
   std::vector<double> tilts;
   for (const tilt_series::View& view : series.views()) tilts.push_back(view.tilt_deg);
   const double thickness = std::max(1.0, std::round(specimen.thickness / plan.bin_factor));
@@ -385,6 +383,15 @@ void realign(const tilt_series::TiltSeries& recorded,
                 processes);
   measurement.rays_bin = bin;
   measurement.geometry.tilt_deg = corrected_tilts(recorded, corrections);
+}
+
+void require_pixels(std::int64_t width, std::int64_t height) {
+  constexpr std::int64_t kFewest = 8;
+  if (std::min(width, height) >= kFewest) return;
+  throw Error(
+      fmt::format("views of {} × {} pixels show nothing: they need at least {} along both sides, "
+                  "after --bin; give a smaller --bin, or check the size in the stack's header",
+                  width, height, kFewest));
 }
 
 }  // namespace tomofield::measurement

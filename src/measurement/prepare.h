@@ -23,13 +23,13 @@ std::vector<std::string> faults_of(const SpecimenOptions& specimen);
 
 /// Returns everything of the measurement that follows from the series' geometry; it has no rays.
 /// Throws Error for options that do not fit the series.
-Measurement plan_measurement(const tilt_series::TiltSeries& series,
+Measurement plan_measurement(const tilt_series::PlannedSeries& series,
                              const SpecimenOptions& specimen);
 
 /// Returns the bytes that reading the views takes at most, besides what is kept of them: those that
 /// are decoded at once, and the buffers from which slabs are filled.
 std::size_t decoding_memory(
-    const tilt_series::TiltSeries& series, const Measurement& plan,
+    const tilt_series::PlannedSeries& series, const Measurement& plan,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
 /// Turns a series into rays in density units. The stored pixels of the series' views are given up
@@ -66,5 +66,8 @@ void realign(const tilt_series::TiltSeries& recorded,
              std::span<const geometry::ViewCorrection> corrections, int bin,
              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
              const distributed::Communicator& processes, Measurement& measurement);
+
+/// Throws Error for views in which nothing can be seen: with fewer than 8 pixels along a side.
+void require_pixels(std::int64_t width, std::int64_t height);
 
 }  // namespace tomofield::measurement

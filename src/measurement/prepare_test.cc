@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "base/random.h"
-#include "geometry/imod_transform.h"
+#include "geometry/raw_from_aligned.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"

@@ -6,8 +6,7 @@
 #include "base/trace.h"
 #include "kernels/lanes.h"
 #include "measurement/row_share.h"
-#include "tilt_series/view_owner.h"
-#include "tilt_series/views_at_once.h"
+#include "tilt_series/own_views.h"
 
 namespace tomofield::measurement {
 namespace {

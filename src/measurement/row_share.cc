@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "distributed/partition.h"
+#include "base/range.h"
 #include "kernels/lanes.h"
 #include "tomofield/error.h"
 
@@ -26,7 +26,7 @@ constexpr double kWorthwhile = 0.95;
 std::vector<RowShare> shares_of_whole_bands(const std::vector<double>& rows_of_band, int size) {
   std::vector<RowShare> shares;
   for (int rank = 0; rank < size; ++rank)
-    shares.push_back({distributed::part_of(rows_of_band, rank, size)});
+    shares.push_back({base::part_of(rows_of_band, rank, size)});
   return shares;
 }
 

@@ -11,10 +11,9 @@
 
 #include "base/range.h"
 #include "distributed/communicator.h"
-#include "distributed/partition.h"
 #include "io/saving/scratch_memory.h"
 #include "kernels/lanes.h"
-#include "tilt_series/masks/mask_disc.h"
+#include "tilt_series/masks/mask_metrics.h"
 
 namespace tomofield::measurement {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/log.h"
-#include "measurement/own_rays.h"
+#include "measurement/background.h"
 
 namespace tomofield::measurement {
 namespace {

@@ -16,7 +16,7 @@
 #include "io/tables/view_table.h"
 #include "microscope/exposure.h"
 #include "tilt_series/match_by_tilt.h"
-#include "tilt_series/open_views.h"
+#include "tilt_series/planned_series.h"
 #include "tomofield/error.h"
 
 namespace tomofield::measurement {
@@ -29,7 +29,7 @@ constexpr double kAngstroms_in_um = 1e4;
 
 // Throws Error if the pixel size is the one that stands for an unknown one.
 void require_pixel_size(const tilt_series::TiltSeriesOptions& input,
-                        const tilt_series::TiltSeries& series, const std::string& stack) {
+                        const tilt_series::PlannedSeries& series, const std::string& stack) {
   const double unbinned_A = series.pixel_size_A() / series.bin_factor();
   if (input.pixel_size_A || std::abs(unbinned_A - 1.0) > 1e-6) return;
   throw Error(
@@ -47,7 +47,7 @@ struct Sections {
 };
 
 Sections sections_of(const tilt_series::TiltSeriesOptions& input,
-                     const tilt_series::TiltSeries& series) {
+                     const tilt_series::PlannedSeries& series) {
   const auto stack = tilt_series::open_views(input);
   Sections sections{input, stack->name(), stack->header().nz, {}};
   sections.tilt_deg.resize(static_cast<std::size_t>(sections.count));
@@ -261,8 +261,8 @@ std::optional<Exposures> find_exposures(const SeriesFiles& files, const ViewOpti
 }
 
 // Returns what the detector passes of the signal, or nothing if it is not known.
-std::shared_ptr<const microscope::Detector> find_detector(const SeriesFiles& files,
-                                                          const tilt_series::TiltSeries& series) {
+std::shared_ptr<const microscope::Detector> find_detector(
+    const SeriesFiles& files, const tilt_series::PlannedSeries& series) {
   if (!files.mtf) return nullptr;
   io::MtfTable mtf = io::read_mtf(*files.mtf);
   base::log_info(
@@ -272,7 +272,7 @@ std::shared_ptr<const microscope::Detector> find_detector(const SeriesFiles& fil
 }
 
 // Sets the defocus of a view, turned to the aligned image, and its slope over that image.
-void set_defocus(const ViewOptions& options, int hand, const tilt_series::TiltSeries& series,
+void set_defocus(const ViewOptions& options, int hand, const tilt_series::PlannedSeries& series,
                  std::size_t view, const io::CtfTable& ctf, microscope::ViewTransfer& transfer) {
   const tilt_series::View& of = series.views()[view];
   const std::optional<io::Defocus>& recorded = ctf.views[static_cast<std::size_t>(of.section)];
@@ -290,7 +290,7 @@ void set_defocus(const ViewOptions& options, int hand, const tilt_series::TiltSe
 
 // Refuses a contrast transfer that spreads detail over more pixels than the view has: its rings are
 // too narrow to be told apart, and no correction means anything (Crowther et al. 1996).
-void require_rings(const tilt_series::TiltSeries& series, const tilt_series::View& view,
+void require_rings(const tilt_series::PlannedSeries& series, const tilt_series::View& view,
                    const microscope::ViewTransfer& transfer) {
   const double largest_A =
       std::max(std::fabs(transfer.defocus.u_A), std::fabs(transfer.defocus.v_A));
@@ -329,7 +329,7 @@ std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const View
 
 std::vector<microscope::ViewTransfer> view_transfers(const tilt_series::TiltSeriesOptions& input,
                                                      int hand,
-                                                     const tilt_series::TiltSeries& series) {
+                                                     const tilt_series::PlannedSeries& series) {
   const SeriesFiles& files = input;
   const ViewOptions& options = input;
   if (!has_ctf(files, options) && !files.ctf && options.contrast == Contrast::kDark)

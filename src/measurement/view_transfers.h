@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "microscope/view_transfer.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/planned_series.h"
 #include "tomofield/options.h"
 
 namespace tomofield::measurement {
@@ -34,6 +34,6 @@ std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const View
 /// known, and for a file that is not of this stack or has no defocus of a view.
 std::vector<microscope::ViewTransfer> view_transfers(const tilt_series::TiltSeriesOptions& input,
                                                      int hand,
-                                                     const tilt_series::TiltSeries& series);
+                                                     const tilt_series::PlannedSeries& series);
 
 }  // namespace tomofield::measurement

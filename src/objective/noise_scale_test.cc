@@ -1,4 +1,4 @@
-#include "objective/noise_scale.h"
+#include "objective/terms.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,7 @@
 #include "option_table/values.h"
 
 #include <fmt/format.h>
+#include <cctype>
 
 #include <algorithm>
 #include <charconv>
@@ -197,6 +198,8 @@ json::json_pointer pointer_to(std::string_view key) {
   return json::json_pointer(path);
 }
 
+int lower(char c) { return std::tolower(static_cast<unsigned char>(c)); }
+
 }  // namespace
 
 std::string set_from_text(const Row& row, std::string_view text, Choices& choices, Origin origin) {
@@ -331,6 +334,24 @@ void choose_by_contrast(Options& options) {
   if (options.fit.fit_view_scale.is_open())
     options.fit.fit_view_scale = Choice<bool>::usual(is_dark);
   options.field.activation.derive(is_dark ? Activation::kIdentity : Activation::kSoftplus);
+}
+
+std::vector<std::string> split_names(std::string_view list) {
+  std::vector<std::string> names(1);
+  for (const char c : list) {
+    if (c == ',')
+      names.emplace_back();
+    else if (std::isspace(static_cast<unsigned char>(c)) == 0)
+      names.back() += c;
+  }
+  std::erase(names, "");
+  return names;
+}
+
+bool has_name(const std::vector<std::string>& names, std::string_view name) {
+  return std::ranges::any_of(names, [&](const std::string& other) {
+    return std::ranges::equal(other, name, {}, lower, lower);
+  });
 }
 
 }  // namespace tomofield::option_table

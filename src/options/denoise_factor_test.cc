@@ -1,4 +1,4 @@
-#include "options/denoise_factor.h"
+#include "options/run_options.h"
 
 #include <gtest/gtest.h>
 

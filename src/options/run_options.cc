@@ -1,6 +1,7 @@
 #include "options/run_options.h"
 
 #include <fmt/format.h>
+#include <cstdlib>
 
 #include <algorithm>
 #include <bit>
@@ -13,8 +14,8 @@
 #include "objective/constants.h"
 #include "option_table/setting.h"
 #include "option_table/values.h"
-#include "options/denoise_factor.h"
-#include "output/shared_options.h"
+#include "tilt_series/series_plan.h"
+#include "tomofield/error.h"
 #include "tune/automatic_choice.h"
 #include "tune/tuning.h"
 
@@ -56,6 +57,8 @@ bool may_learn(const Options& options) {
   return options.field.budget.empty() && fit::can_have_learned_prior(options.field, options.fit);
 }
 
+constexpr double kLeastFactor = 0.05, kMostFactor = 20;
+
 }  // namespace
 
 Options resolve(const SeriesFiles& files, const Options& requested) {
@@ -73,7 +76,7 @@ ReconstructOptions run_options(const SeriesFiles& files, const Options& requeste
 }
 
 tilt_series::TiltSeriesOptions ReconstructOptions::input() const {
-  tilt_series::TiltSeriesOptions input = output::series_options(files, *this);
+  tilt_series::TiltSeriesOptions input = tilt_series::series_options(files, *this);
   input.images = images;
   input.corrections = corrections;
   input.left_out = left_out;
@@ -235,6 +238,23 @@ nlohmann::json options_json(const ReconstructOptions& options) {
                      {"concavity", objective::kConcavity},
                      {"gradient_floor", objective::kGradientFloor}});
   return all;
+}
+
+double denoise_factor(const std::string& text) {
+  for (const DenoisePlace& place : kDenoisePlaces)
+    if (text == place.name) return place.factor;
+  char* end = nullptr;
+  const double factor = std::strtod(text.c_str(), &end);
+  if (end == text.c_str() || *end != '\0' || !(factor >= kLeastFactor && factor <= kMostFactor))
+    throw Error(fmt::format(
+        "--denoise '{}' is no strength: give light, medium, strong, or a factor from {} to {}",
+        text, kLeastFactor, kMostFactor));
+  return factor;
+}
+
+FitOptions with_denoise(FitOptions fit) {
+  fit.density_variation = fit.density_variation * denoise_factor(fit.denoise);
+  return fit;
 }
 
 }  // namespace tomofield::options

@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "base/stopwatch.h"
+#include "align/alignment_record.h"
+#include "base/progress.h"
 #include "measurement/prepare.h"
 #include "measurement/view_transfers.h"
 #include "option_table/setting.h"
@@ -29,9 +30,8 @@ struct ReconstructOptions : Options {
   std::shared_ptr<const io::ImageStack> images = {};  ///< views in memory, in place of files.stack
   /// [section]: changes of the alignment that the files give; empty: none.
   std::vector<geometry::ViewCorrection> corrections = {};
-  std::vector<std::int64_t> left_out = {};  ///< sections, beside views.exclude
-  /// Record of the alignment before the fit (realign/), for the metrics; null without one.
-  nlohmann::json alignment = {};
+  std::vector<std::int64_t> left_out = {};                   ///< sections, beside views.exclude
+  std::optional<alignment::AlignmentRecord> alignment = {};  ///< before the fit, if there was one
   base::Stopwatch since_start = {};  ///< runs from run_options() on, before an alignment
 
   /// Returns how the tilt series is read.
@@ -72,5 +72,22 @@ ReconstructOptions run_options(const SeriesFiles& files, const Options& requeste
 
 /// Writes the resolved options and the constants of the method for the metrics and the model file.
 nlohmann::json options_json(const ReconstructOptions& options);
+
+/// A strength of `--denoise` that has a name.
+struct DenoisePlace {
+  const char* name;
+  double factor;
+};
+inline constexpr DenoisePlace kDenoisePlaces[] = {{"light", 0.5}, {"medium", 1.0}, {"strong", 2.0}};
+
+/// Returns the factor by which `--denoise` multiplies the weight of total variation: light is 0.5,
+/// medium is 1 and strong is 2; a number is itself. Throws Error for any other text, and for
+/// numbers that are not from 0.05 to 20.
+double denoise_factor(const std::string& text);
+
+/// Returns the options of a fit with its weight of total variation multiplied by that factor. The
+/// options of a run keep the weight that was given or chosen, so that they make the same fit when
+/// they are given again.
+FitOptions with_denoise(FitOptions fit);
 
 }  // namespace tomofield::options

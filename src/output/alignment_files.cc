@@ -8,7 +8,7 @@
 
 #include "base/check.h"
 #include "base/log.h"
-#include "geometry/imod_transform.h"
+#include "geometry/raw_from_aligned.h"
 #include "io/saving/output_set.h"
 #include "io/tables/write_alignment.h"
 
@@ -18,11 +18,11 @@ namespace fs = std::filesystem;
 namespace {
 
 using geometry::RawFromAligned;
-using tilt_series::TiltSeries;
+using tilt_series::PlannedSeries;
 using tilt_series::View;
 
 // Returns the map of a view in pixels before binning.
-RawFromAligned unbinned_map(const TiltSeries& series, std::size_t view) {
+RawFromAligned unbinned_map(const PlannedSeries& series, std::size_t view) {
   return series.raw_from_aligned(view).binned(1.0 / series.bin_factor());
 }
 
@@ -32,7 +32,7 @@ RawFromAligned rotation(double angle_rad) {
 }
 
 // Returns the mean of the views' rotations, as directions.
-double mean_rotation_rad(const TiltSeries& series) {
+double mean_rotation_rad(const PlannedSeries& series) {
   double sum_cos = 0.0, sum_sin = 0.0;
   for (std::size_t view = 0; view < series.views().size(); ++view) {
     const double angle_rad = series.raw_from_aligned(view).rotation_rad();
@@ -70,7 +70,7 @@ double largest_change(const RawFromAligned& map, double width, double height) {
 }
 
 // Warns if rotations and shifts do not describe the views.
-void warn_of_change(const TiltSeries& series, const AlignmentFiles& files) {
+void warn_of_change(const PlannedSeries& series, const AlignmentFiles& files) {
   constexpr double kNoticeable_px = 0.1;
   const double width = static_cast<double>(series.aligned_width()) * series.bin_factor();
   const double height = static_cast<double>(series.aligned_height()) * series.bin_factor();
@@ -84,7 +84,7 @@ void warn_of_change(const TiltSeries& series, const AlignmentFiles& files) {
                   files.aln.string(), largest, files.xf.string()));
 }
 
-bool has_mirrored_views(const TiltSeries& series) {
+bool has_mirrored_views(const PlannedSeries& series) {
   for (std::size_t view = 0; view < series.views().size(); ++view) {
     const RawFromAligned map = series.raw_from_aligned(view);
     if (map.m11 * map.m22 - map.m12 * map.m21 < 0) return true;
@@ -149,7 +149,7 @@ AlignmentFiles alignment_files(const fs::path& prefix) {
   return {with(".xf"), with(".tlt"), with(".xtilt"), with(".aln")};
 }
 
-void write_alignment_files(const TiltSeries& series, const std::array<std::int64_t, 3>& raw_size,
+void write_alignment_files(const PlannedSeries& series, const std::array<std::int64_t, 3>& raw_size,
                            const AlignmentFiles& files) {
   const std::vector<View>& views = series.views();
   TOMOFIELD_CHECK(views.back().section < raw_size[2], "a view is of no section of the stack");

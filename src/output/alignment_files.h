@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/planned_series.h"
 
 namespace tomofield::output {
 
@@ -36,7 +36,7 @@ AlignmentFiles alignment_files(const std::filesystem::path& prefix);
 ///   There is no .aln of mirrored views, and a warning says so.
 ///
 /// The angles include --tilt-offset and --x-axis-tilt, which are not to be applied again.
-void write_alignment_files(const tilt_series::TiltSeries& series,
+void write_alignment_files(const tilt_series::PlannedSeries& series,
                            const std::array<std::int64_t, 3>& raw_size,
                            const AlignmentFiles& files);
 

@@ -23,7 +23,7 @@ using testing::ScratchDirectory;
 using testing::some_value;
 using testing::WarningCatcher;
 using testing::write_stack;
-using tilt_series::TiltSeries;
+using tilt_series::PlannedSeries;
 using tilt_series::TiltSeriesOptions;
 
 constexpr std::array<std::int64_t, 3> kRawSize{40, 28, 6};
@@ -34,7 +34,6 @@ TiltSeriesOptions six_sections(const ScratchDirectory& scratch) {
   options.stack = write_stack(scratch / "raw.st", kRawSize[0], kRawSize[1], 6, some_value);
   options.tlt = scratch.write("raw.tlt", "-25\n-15\n-5\n5\n15\n25\n");
   options.contrast = Contrast::kBright;
-  options.look_at_views = false;
   return options;
 }
 
@@ -51,7 +50,7 @@ std::string transforms(const std::function<double(int)>& rotation_deg, double ma
 }
 
 // Reads the stack again by the files of IMOD that were written, unbinned.
-TiltSeries by_imod(const TiltSeriesOptions& options, const AlignmentFiles& files) {
+PlannedSeries by_imod(const TiltSeriesOptions& options, const AlignmentFiles& files) {
   TiltSeriesOptions again = options;
   again.bin = 1;
   again.tilt_offset_deg = again.x_axis_tilt_deg = 0;
@@ -60,11 +59,11 @@ TiltSeries by_imod(const TiltSeriesOptions& options, const AlignmentFiles& files
   again.xf = files.xf;
   again.tlt = files.tlt;
   if (std::filesystem::exists(files.xtilt)) again.xtilt = files.xtilt;
-  return TiltSeries(again);
+  return PlannedSeries(again);
 }
 
 // Does the same by the .aln, which says itself what is left out.
-TiltSeries by_aretomo(const TiltSeriesOptions& options, const AlignmentFiles& files) {
+PlannedSeries by_aretomo(const TiltSeriesOptions& options, const AlignmentFiles& files) {
   TiltSeriesOptions again = options;
   again.bin = 1;
   again.tilt_offset_deg = again.x_axis_tilt_deg = 0;
@@ -74,11 +73,11 @@ TiltSeries by_aretomo(const TiltSeriesOptions& options, const AlignmentFiles& fi
   again.xtilt.reset();
   if (std::filesystem::exists(files.xtilt)) again.xtilt = files.xtilt;
   again.aln = files.aln;
-  return TiltSeries(again);
+  return PlannedSeries(again);
 }
 
 // Expects the same views, to the rounding of the files.
-void expect_same(const TiltSeries& read, const TiltSeries& written) {
+void expect_same(const PlannedSeries& read, const PlannedSeries& written) {
   ASSERT_EQ(read.views().size(), written.views().size());
   for (std::size_t i = 0; i < read.views().size(); ++i) {
     EXPECT_EQ(read.views()[i].section, written.views()[i].section);
@@ -116,7 +115,7 @@ TEST(AlignmentFiles, GiveTheSeriesBack) {
     options.x_axis_tilt_deg = 3;
     options.bin = 1.7;
     const WarningCatcher warnings;
-    const TiltSeries series(options);
+    const PlannedSeries series(options);
     const AlignmentFiles files = alignment_files(scratch / "out");
     write_alignment_files(series, kRawSize, files);
     expect_same(by_imod(options, files), series);
@@ -130,11 +129,11 @@ TEST(AlignmentFiles, GiveBackASeriesWhoseAxisIsNearX) {
   TiltSeriesOptions options = six_sections(scratch);
   options.xf = scratch.write("raw.xf", transforms([](int s) { return -94.0 + 0.1 * s; }));
   options.exclude = "2-3";
-  const TiltSeries series(options);
+  const PlannedSeries series(options);
   ASSERT_EQ(series.aligned_width(), kRawSize[1]);
   const AlignmentFiles files = alignment_files(scratch / "out");
   write_alignment_files(series, kRawSize, files);
-  for (const TiltSeries& read : {by_imod(options, files), by_aretomo(options, files)}) {
+  for (const PlannedSeries& read : {by_imod(options, files), by_aretomo(options, files)}) {
     expect_same(read, series);
     EXPECT_EQ(read.aligned_width(), kRawSize[1]);
     EXPECT_EQ(read.aligned_height(), kRawSize[0]);
@@ -152,7 +151,7 @@ TEST(AlignmentFiles, HaveTheNumbersWorkedByHand) {
   options.aln = scratch.write("raw.aln", rows);
   options.tlt.reset();
   options.bin = 2;
-  const TiltSeries series(options);
+  const PlannedSeries series(options);
   ASSERT_NEAR(series.raw_from_aligned(0).shift_x_px, 2, 1e-12);
   const AlignmentFiles files = alignment_files(scratch / "out");
   write_alignment_files(series, kRawSize, files);
@@ -173,7 +172,7 @@ TEST(AlignmentFiles, HaveALineForSectionsThatAreLeftOut) {
   options.xf = scratch.write("raw.xf", transforms([](int s) { return s == 1 ? 3.0 : 1.0; }));
   options.exclude = "3-4";
   const AlignmentFiles files = alignment_files(scratch / "out");
-  write_alignment_files(TiltSeries(options), kRawSize, files);
+  write_alignment_files(PlannedSeries(options), kRawSize, files);
   const auto angles = io::read_number_column(files.tlt, "an angle");
   ASSERT_EQ(angles.size(), 6u);
   EXPECT_EQ(angles[2].value, -5.0);
@@ -194,7 +193,7 @@ TEST(AlignmentFiles, AnglesBeyondTheLastViewGoOnAndStayPlausible) {
   options.exclude = "1,4-6";
   const AlignmentFiles files = alignment_files(scratch / "out");
   const auto angle = [&](std::size_t section) {
-    write_alignment_files(TiltSeries(options), kRawSize, files);
+    write_alignment_files(PlannedSeries(options), kRawSize, files);
     return io::read_number_column(files.tlt, "an angle").at(section).value;
   };
   EXPECT_EQ(angle(0), -25.0);
@@ -213,7 +212,7 @@ TEST(AlignmentFiles, ACornerThatAreTomosFormatMovesIsSaid) {
   options.xf = scratch.write("raw.xf", transforms([](int) { return 2.0; }, 1.02));
   const AlignmentFiles files = alignment_files(scratch / "out");
   const WarningCatcher warnings;
-  const TiltSeries series(options);
+  const PlannedSeries series(options);
   write_alignment_files(series, kRawSize, files);
   expect_parts(warnings.text(), {"out.aln", "0.49 pixels", "out.xf"});
   expect_same(by_imod(options, files), series);
@@ -231,7 +230,7 @@ TEST(AlignmentFiles, MirroredViewsHaveNoAreTomoFile) {
   options.xf = scratch.write("raw.xf", text);
   const AlignmentFiles files = alignment_files(scratch / "out");
   const WarningCatcher warnings;
-  const TiltSeries series(options);
+  const PlannedSeries series(options);
   write_alignment_files(series, kRawSize, files);
   expect_parts(warnings.text(), {"out.aln", "mirrored"});
   EXPECT_FALSE(std::filesystem::exists(files.aln));
@@ -242,7 +241,7 @@ TEST(AlignmentFiles, AnOldXtiltDoesNotStayBesideViewsWithoutOne) {
   const ScratchDirectory scratch;
   const AlignmentFiles files = alignment_files(scratch / "out");
   scratch.write("out.xtilt", "1\n");
-  const TiltSeries series(six_sections(scratch));
+  const PlannedSeries series(six_sections(scratch));
   io::OutputSet results;
   write_alignment_files(series, kRawSize, files);
   EXPECT_TRUE(std::filesystem::exists(files.xtilt));

@@ -14,7 +14,6 @@
 #include "base/threads/parallel.h"
 #include "compact/decoded_field.h"
 #include "io/hdf5/hdf5_reader.h"
-#include "output/model_format.h"
 #include "tomofield/error.h"
 #include "tomofield/version.h"
 
@@ -382,6 +381,17 @@ TrainingState load_training(const std::filesystem::path& path) {
 void load_floats(const std::filesystem::path& path, const std::string& name,
                  const field::Field& field, std::span<float> values) {
   ModelReader(path).read_floats(name, field, values);
+}
+
+ModelInfo model_info(const measurement::Measurement& series, Contrast contrast) {
+  ModelInfo info;
+  info.geometry = series.geometry;
+  info.roi = series.roi;
+  info.x_tilt_deg = series.x_tilt_deg;
+  info.pixel_size_A = series.pixel_size_A;
+  info.density_unit = series.unit;
+  info.is_dark = contrast == Contrast::kDark;
+  return info;
 }
 
 }  // namespace tomofield::output

@@ -15,9 +15,21 @@
 #include "compact/coded_field.h"
 #include "field/field.h"
 #include "geometry/tilt_geometry.h"
+#include "measurement/measurement.h"
 #include "tomofield/options.h"
 
+// Declares what the writer and the reader of model files share (model_writer.cc, model_file.cc).
+
 namespace tomofield::output {
+
+// These values are in files: do not change one without a new version.
+inline constexpr const char* kFormat = "tomofield model";
+inline constexpr std::int64_t kFormatVersion = 2;
+inline constexpr std::int64_t kCompactVersion = 3;  ///< of models with codes in place of parameters
+
+/// Throws Error, which begins with `complaint`, if a parameter that a field keeps is not
+/// plausible (base/plausible.h).
+void require_plausible_parameters(const field::Field& field, const std::string& complaint);
 
 /// The meaning of a field: its place, its scale and its source.
 struct ModelInfo {
@@ -124,5 +136,8 @@ TrainingState load_training(const std::filesystem::path& path);
 /// leaves that `field` keeps. Throws Error if there is no such array or if it has another size.
 void load_floats(const std::filesystem::path& path, const std::string& name,
                  const field::Field& field, std::span<float> values);
+
+/// Returns what densities that were fitted to a measurement mean.
+ModelInfo model_info(const measurement::Measurement& series, Contrast contrast);
 
 }  // namespace tomofield::output

@@ -12,7 +12,6 @@
 #include "io/hdf5/hdf5_file.h"
 #include "io/saving/atomic_file.h"
 #include "output/model_file.h"
-#include "output/model_format.h"
 #include "tomofield/error.h"
 #include "tomofield/version.h"
 

@@ -19,14 +19,14 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
           .json = with(".json"),
           .report = with("_report.html"),
           .tree_picture = with("_tree.png"),
-          .picture_prefix = stem,
+          .slice_pictures = {with("_xy.png"), with("_xz.png"), with("_yz.png")},
+          .mask_picture = with("_mask.png"),
           .held_out_picture = with("_held_out.png"),
           .choice_picture = with("_choice.png"),
           .dial_picture = with("_denoise.png"),
           .prior_picture = with("_prior.png"),
           .trials = with("_tune.json"),
           .alignment = with("_align.json"),
-          .xy_picture = with("_xy.png"),
           .alignment_prefix = with("_align"),
           .alignment_picture = with("_align.png"),
           .alignment_star = with("_align.star"),
@@ -37,6 +37,12 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
           .fsc_picture = with("_fsc.png"),
           .local_resolution = with("_local_resolution.mrc"),
           .uncertainty = with("_uncertainty.mrc")};
+}
+
+std::vector<std::filesystem::path> OutputPaths::pictures() const {
+  std::vector<std::filesystem::path> all(slice_pictures.begin(), slice_pictures.end());
+  all.push_back(mask_picture);
+  return all;
 }
 
 }  // namespace tomofield::output

@@ -8,7 +8,7 @@
 #include "fit/stages.h"
 #include "measurement/measurement.h"
 #include "options/run_options.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/planned_series.h"
 
 namespace tomofield::plan {
 
@@ -17,7 +17,7 @@ constexpr std::size_t kProgramBytes = std::size_t{28} << 20;
 
 /// A fit whose memory is wanted. `plan` has no rays.
 struct PlannedFit {
-  const tilt_series::TiltSeries& series;
+  const tilt_series::PlannedSeries& series;
   const measurement::Measurement& plan;
   const fit::Domain& domain;
   const options::ReconstructOptions& options;

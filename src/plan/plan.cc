@@ -8,7 +8,6 @@
 
 #include "align/alignment.h"
 #include "base/check.h"
-#include "base/log_pause.h"
 #include "base/system/memory.h"
 #include "base/threads/parallel.h"
 #include "baseline/run_baseline.h"
@@ -18,8 +17,8 @@
 #include "fit/fit.h"
 #include "fit/stages.h"
 #include "measurement/held_out.h"
+#include "measurement/prepare.h"
 #include "measurement/slab_views.h"
-#include "measurement/view_size.h"
 #include "plan/memory_estimate.h"
 #include "plan/tile_plan.h"
 #include "tomofield/error.h"
@@ -30,32 +29,22 @@ namespace tomofield::plan {
 namespace {
 
 // Returns the peak memory of a process while it aligns the views.
-std::size_t memory_of_alignment(const tilt_series::TiltSeries& series,
+std::size_t memory_of_alignment(const tilt_series::PlannedSeries& series,
                                 const measurement::Measurement& plan,
                                 options::ReconstructOptions options,
                                 const distributed::Communicator& processes) {
   const bool from_raw = options.run.align == Alignment::kFull;
-  options.field = align::planned_field(options.field);
-  options.fit = align::planned_fits(plan, from_raw, options.fit.seed).front().options;
+  options.field = alignment::planned_field(options.field);
+  options.fit = alignment::planned_fits(plan, from_raw, options.fit.seed).front().options;
   const fit::Domain domain = fit::make_domain(plan.geometry, plan.roi, options.field);
   return estimate_memory({series, plan, domain, options, processes},
                          fit::make_stages(options.field, options.fit)) +
-         series.stored_memory(processes) + align::memory_beside_fit(plan);
-}
-
-// Opens the series as the files describe it, whose views are not read. What there is to say of it
-// is said when they are.
-tilt_series::TiltSeries planned_series(const options::ReconstructOptions& options,
-                                       const distributed::Communicator& processes) {
-  const base::LogPause pause;
-  tilt_series::TiltSeriesOptions input = options.input();
-  input.look_at_views = false;
-  return tilt_series::TiltSeries(input, processes);
+         series.stored_memory(processes) + alignment::memory_beside_fit(plan);
 }
 
 // Returns the bytes that writing the results of halves takes: the rays, and a model that is
 // sampled, or what compares the volumes or makes linear ones.
-std::size_t memory_of_halves(const tilt_series::TiltSeries& series,
+std::size_t memory_of_halves(const tilt_series::PlannedSeries& series,
                              const measurement::Measurement& plan, const fit::Domain& domain,
                              const options::ReconstructOptions& options) {
   const auto model = static_cast<std::size_t>(parameter_bytes(
@@ -119,7 +108,7 @@ int most_vertices(const fit::Domain& domain) {
 
 }  // namespace
 
-RunPlan plan_run(const tilt_series::TiltSeries& series, const options::ReconstructOptions& given,
+RunPlan plan_run(const tilt_series::PlannedSeries& series, const options::ReconstructOptions& given,
                  const distributed::Communicator& processes) {
   const options::ReconstructOptions options = given.with_open_prior();
   if (processes.size() > 1) base::require_no_faults(given.faults_of_job());
@@ -149,8 +138,8 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const options::Reconstru
   run.num_steps = (last.first_epoch + last.epochs) * run.steps_an_epoch;
   run.tiles = plan_tiles({series, plan, domain, options, processes});
   const bool aligns = options.run.align != Alignment::kOff;
-  if (aligns && options.alignment.is_null())
-    align::require_views(static_cast<std::size_t>(run.num_views));
+  if (aligns && !options.alignment)
+    alignment::require_views(static_cast<std::size_t>(run.num_views));
   run.memory_bytes = run.tiles.is_used()
                          ? run.tiles.memory_bytes
                          : estimate_memory({series, plan, domain, options, processes}, run.stages);
@@ -175,7 +164,7 @@ void require_memory(const RunPlan& plan, const distributed::Communicator& proces
                        "fewer --threads, or --budget, which fits tiles and makes them compact");
 }
 
-RunPlan require_possible_run(const tilt_series::TiltSeries& series,
+RunPlan require_possible_run(const tilt_series::PlannedSeries& series,
                              const options::ReconstructOptions& options,
                              const distributed::Communicator& processes) {
   RunPlan plan = plan_run(series, options, processes);
@@ -187,15 +176,15 @@ RunPlan require_possible_run(const tilt_series::TiltSeries& series,
 void check_before_alignment(const options::ReconstructOptions& options,
                             const distributed::Communicator& processes) {
   if (options.run.align == Alignment::kOff) return;
-  const tilt_series::TiltSeries series = planned_series(options, processes);
+  const tilt_series::PlannedSeries series(options.input(), processes);
   processes.run_collectively([&] { require_possible_run(series, options, processes); });
 }
 
 void check_alignment_alone(const options::ReconstructOptions& options) {
   const distributed::Communicator& alone = distributed::Communicator::alone();
-  const tilt_series::TiltSeries series = planned_series(options, alone);
+  const tilt_series::PlannedSeries series(options.input());
   const measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
-  align::require_views(series.views().size());
+  alignment::require_views(series.views().size());
   base::require_memory(memory_of_alignment(series, plan, options, alone), "this alignment",
                        "use a larger --bin, a smaller --roi or --thickness, or fewer --threads");
 }

@@ -7,8 +7,8 @@
 #include "distributed/communicator.h"
 #include "fit/stages.h"
 #include "options/run_options.h"
-#include "plan/tiles.h"
-#include "tilt_series/tilt_series.h"
+#include "plan/tile_plan.h"
+#include "tilt_series/planned_series.h"
 #include "tomofield/options.h"
 
 namespace tomofield::plan {
@@ -34,7 +34,8 @@ struct RunPlan {
 
 /// Plans a run. It writes nothing and allocates neither views nor parameters. Throws Error for
 /// options that do not fit the series or the number of processes.
-RunPlan plan_run(const tilt_series::TiltSeries& series, const options::ReconstructOptions& options,
+RunPlan plan_run(const tilt_series::PlannedSeries& series,
+                 const options::ReconstructOptions& options,
                  const distributed::Communicator& processes = distributed::Communicator::alone());
 
 /// Throws Error if this machine has less memory than a run needs.
@@ -43,7 +44,7 @@ void require_memory(const RunPlan& plan, const distributed::Communicator& proces
 
 /// Returns plan_run(), and throws Error also as require_memory() and require_few_vertices() do.
 RunPlan require_possible_run(
-    const tilt_series::TiltSeries& series, const options::ReconstructOptions& options,
+    const tilt_series::PlannedSeries& series, const options::ReconstructOptions& options,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
 /// Checks a run with --align before its views are aligned, which takes long: throws Error as

@@ -35,7 +35,7 @@ class Plan : public ::testing::Test {
     options_.fit.subsets = 4;
   }
 
-  RunPlan plan() const { return plan_run(tilt_series::TiltSeries(options_.input()), options_); }
+  RunPlan plan() const { return plan_run(tilt_series::PlannedSeries(options_.input()), options_); }
 
   testing::ScratchDirectory scratch_;
   options::ReconstructOptions options_;
@@ -140,7 +140,7 @@ TEST_F(Plan, RefusesTooFewViewsForAnAlignmentBeforeIt) {
   refusal([&] { plan(); });
   refusal([&] { check_before_alignment(options_); });
   refusal([&] { check_alignment_alone(options_); });
-  options_.alignment = {{"accepted", true}};  // it may have left views out
+  options_.alignment.emplace();  // it may have left views out
   plan();
 }
 

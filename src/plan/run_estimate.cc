@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "align/alignment.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 #include "fit/stages.h"
 #include "io/saving/scratch_memory.h"
 #include "measurement/prepare.h"
@@ -73,7 +73,7 @@ struct Work {
   FilterTimes& filters;
   double steps_of_vertices = 0, samples_of_vertices = 0;
   double steps_of_factors = 0, samples_of_factors = 0;
-  double updates_of_views = 0;  // in times of align::seconds_of_update()
+  double updates_of_views = 0;  // in times of alignment::seconds_of_update()
   double filter_seconds = 0;    // of filtering views for surrogates
 
   // Adds the first epochs of a fit of at most `max_rows` rows, `times` times.
@@ -116,9 +116,10 @@ struct Work {
 void add_alignment(const measurement::Measurement& plan, const options::ReconstructOptions& options,
                    const RunPlan& run, Work& work) {
   constexpr double kAllRows = std::numeric_limits<double>::infinity();
-  const FieldOptions field = align::planned_field(options.field);
+  const FieldOptions field = alignment::planned_field(options.field);
   const bool from_raw = options.run.align == Alignment::kFull;
-  for (const align::PlannedFits& fits : align::planned_fits(plan, from_raw, options.fit.seed)) {
+  for (const alignment::PlannedFits& fits :
+       alignment::planned_fits(plan, from_raw, options.fit.seed)) {
     work.add_fit(plan, field, fits.options, run.steps_an_epoch, kAllRows, fits.times, fits.epochs);
     work.updates_of_views += fits.updates * fits.times * plan.geometry.num_views();
   }
@@ -168,15 +169,13 @@ struct ViewTimes {
 };
 
 // Measures them on a view in the middle of the series.
-ViewTimes measure_view(const tilt_series::TiltSeries& series, bool aligns) {
-  const auto pixels = static_cast<std::size_t>(series.width() * series.height());
-  std::vector<float> image(pixels);
-  std::vector<std::uint8_t> valid(pixels);
+ViewTimes measure_view(const tilt_series::PlannedSeries& series, bool aligns) {
   ViewTimes times;
   const base::ProcessorStopwatch decoding;
-  series.read_view(series.views().size() / 2, image, valid);
+  const tilt_series::MaskedImage image =
+      tilt_series::decode_view(series, series.views().size() / 2);
   times.decoding = decoding.seconds();
-  if (aligns) times.update = align::seconds_of_update(image, series.width());
+  if (aligns) times.update = alignment::seconds_of_update(image.values, series.width());
   return times;
 }
 
@@ -186,7 +185,7 @@ double num_voxels(const RunPlan& run) {
 }
 
 // Returns the bytes of the scratch files of the decoded views and of the rays.
-std::size_t scratch_bytes(const tilt_series::TiltSeries& series,
+std::size_t scratch_bytes(const tilt_series::PlannedSeries& series,
                           const measurement::Measurement& plan) {
   const std::size_t views = static_cast<std::size_t>(series.width() * series.height()) *
                             series.views().size() * sizeof(float);
@@ -196,7 +195,7 @@ std::size_t scratch_bytes(const tilt_series::TiltSeries& series,
 
 }  // namespace
 
-RunEstimate estimate_run(const tilt_series::TiltSeries& series,
+RunEstimate estimate_run(const tilt_series::PlannedSeries& series,
                          const options::ReconstructOptions& given, const RunPlan& run) {
   const options::ReconstructOptions options = given.with_open_prior();
   measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);

@@ -5,7 +5,7 @@
 
 #include "options/run_options.h"
 #include "plan/plan.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/planned_series.h"
 
 namespace tomofield::plan {
 
@@ -26,7 +26,7 @@ struct RunEstimate {
 /// stages of the run. A step costs a fixed time and a time a sample, and the plan says how many
 /// samples and steps there are. What a run decides on the way is not known: how many trials it
 /// makes, how an adaptive tree grows, when --early-stop ends it.
-RunEstimate estimate_run(const tilt_series::TiltSeries& series,
+RunEstimate estimate_run(const tilt_series::PlannedSeries& series,
                          const options::ReconstructOptions& options, const RunPlan& plan);
 
 }  // namespace tomofield::plan

@@ -38,11 +38,11 @@ class Estimate : public ::testing::Test {
 
   RunPlan plan() const {
     const options::ReconstructOptions run = options::run_options(files_, options_);
-    return plan_run(tilt_series::TiltSeries(run.input()), run);
+    return plan_run(tilt_series::PlannedSeries(run.input()), run);
   }
   RunEstimate estimate() const {
     const options::ReconstructOptions run = options::run_options(files_, options_);
-    const tilt_series::TiltSeries series(run.input());
+    const tilt_series::PlannedSeries series(run.input());
     return estimate_run(series, run, plan_run(series, run));
   }
 

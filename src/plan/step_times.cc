@@ -7,9 +7,9 @@
 #include <optional>
 #include <span>
 
+#include "base/progress.h"
 #include "base/random.h"
 #include "base/statistics.h"
-#include "base/stopwatch.h"
 #include "base/threads/parallel.h"
 #include "fit/domain.h"
 #include "fit/fit.h"

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/check.h"
-#include "option_table/name_list.h"
+#include "option_table/values.h"
 #include "tomofield/error.h"
 
 namespace tomofield::projects {

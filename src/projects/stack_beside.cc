@@ -1,7 +1,7 @@
 #include "projects/stack_beside.h"
 
 #include "io/images/image_stack.h"
-#include "io/images/own_volume.h"
+#include "io/images/mrc.h"
 #include "io/is_file.h"
 #include "tomofield/error.h"
 

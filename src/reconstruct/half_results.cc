@@ -9,6 +9,7 @@
 #include "base/log.h"
 #include "base/utf8.h"
 #include "baseline/run_baseline.h"
+#include "evaluate/evaluation_record.h"
 #include "evaluate/resolution/block_fsc.h"
 #include "evaluate/resolution/local_resolution.h"
 #include "evaluate/uncertainty.h"
@@ -22,6 +23,7 @@
 #include "report/choice_plot.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
+#include "verdict/verdict_record.h"
 
 namespace tomofield::reconstruction {
 namespace {

@@ -23,7 +23,7 @@
 #include "measurement/held_out.h"
 #include "measurement/undecided_beads.h"
 #include "measurement/view_transfers.h"
-#include "options/denoise_factor.h"
+#include "options/run_options.h"
 #include "output/output_paths.h"
 #include "plan/plan.h"
 #include "realign/aligned_series.h"
@@ -34,8 +34,9 @@
 #include "reconstruct/run_fit.h"
 #include "reconstruct/tiled_run.h"
 #include "report/denoise_dial.h"
-#include "report/prior_picture.h"
+#include "report/pictures.h"
 #include "tomofield/error.h"
+#include "tune/trial_record.h"
 #include "tune/tuning.h"
 
 namespace tomofield::reconstruction {
@@ -141,7 +142,7 @@ bool choose_settings(Run& run, std::optional<tune::TunedFit>& tuned) {
 }
 
 // Returns where each view comes from in the stack.
-std::vector<geometry::RawFromAligned> alignment_of(const tilt_series::TiltSeries& series) {
+std::vector<geometry::RawFromAligned> alignment_of(const tilt_series::PlannedSeries& series) {
   std::vector<geometry::RawFromAligned> alignment;
   for (std::size_t view = 0; view < series.views().size(); ++view)
     alignment.push_back(series.raw_from_aligned(view));
@@ -170,7 +171,7 @@ bool align_views(options::ReconstructOptions& options, const Observer& observer,
 }
 
 // Notes the tilt axis by which views are turned because a file states it.
-void note_axis(const tilt_series::TiltSeries& series, options::ReconstructOptions& options) {
+void note_axis(const tilt_series::PlannedSeries& series, options::ReconstructOptions& options) {
   const auto& axis = series.stated_axis();
   if (!axis || axis->is_given) return;
   options.views.tilt_axis_deg = axis->angle_deg;
@@ -181,7 +182,7 @@ void note_axis(const tilt_series::TiltSeries& series, options::ReconstructOption
 }
 
 // Plans the run, and tells the observer.
-plan::RunPlan make_plan(const tilt_series::TiltSeries& series,
+plan::RunPlan make_plan(const tilt_series::PlannedSeries& series,
                         const options::ReconstructOptions& options, const Observer& observer,
                         const distributed::Communicator& processes) {
   plan::RunPlan plan;
@@ -251,9 +252,7 @@ RunResult run(options::ReconstructOptions options, const Observer& observer,
 Preview preview(const options::ReconstructOptions& options,
                 const distributed::Communicator& processes) {
   processes.run_collectively([&] { check_options(options); });
-  tilt_series::TiltSeriesOptions input = options.input();
-  input.keep_views = false;
-  const tilt_series::TiltSeries series(input, processes);
+  const tilt_series::MeasuredSeries series(options.input(), processes);
   Preview preview;
   preview.plan = make_plan(series, options, {}, processes);
   processes.run_collectively([&] {
@@ -283,7 +282,7 @@ bool align(options::ReconstructOptions& options, const Observer& observer) {
   plan::check_alignment_alone(options);
   io::OutputSet results;  // the record of the alignment joins the other files
   if (!align_views(options, observer, alone)) return false;
-  exchange::write_alignment_results(tilt_series::TiltSeries(options.input()), options);
+  exchange::write_alignment_results(tilt_series::PlannedSeries(options.input()), options);
   results.commit();
   return true;
 }

@@ -14,19 +14,20 @@
 #include <utility>
 #include <vector>
 
+#include "base/progress.h"
 #include "base/range.h"
-#include "base/stopwatch.h"
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "checkpoint/checkpoint.h"
 #include "compact/budget.h"
 #include "compact/compress.h"
 #include "evaluate/artefacts.h"
+#include "evaluate/evaluation_record.h"
 #include "io/json.h"
 #include "io/saving/output_set.h"
 #include "option_table/setting.h"
-#include "options/denoise_factor.h"
-#include "output/metrics.h"
+#include "options/run_options.h"
+#include "output/metrics_record.h"
 #include "output/output_paths.h"
 #include "output/volume.h"
 #include "reconstruct/run_files.h"
@@ -34,7 +35,9 @@
 #include "report/choice_plot.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
+#include "tune/trial_record.h"
 #include "verdict/judge.h"
+#include "verdict/verdict_record.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -55,7 +58,7 @@ nlohmann::json held_out_json(const fit::Fit& fit, const measurement::Measurement
                              const std::optional<measurement::ViewErrors>& errors) {
   if (!errors) return nullptr;
   nlohmann::json json =
-      measurement::report_held_out(*errors, series.geometry.tilt_deg, options.fit.patience > 0);
+      output::report_held_out(*errors, series.geometry.tilt_deg, options.fit.patience > 0);
   json["error_by_epoch"] = fit.progress().held_out_error;
   return json;
 }
@@ -184,7 +187,7 @@ void make_compact(const compact::Budget& budget, RunResult& results) {
       [&](const compact::CodedField& coded) { return output::coded_file_size(coded, model); });
   results.model->field = std::move(made.field);
   results.model->coded = std::move(made.coded);
-  results.metrics["metrics"]["compact"] = compact::report_json(made.report, running.seconds());
+  results.metrics["metrics"]["compact"] = output::compact_json(made.report, running.seconds());
 }
 
 // Does the same. If that fails, keeps the finished fit.
@@ -219,7 +222,8 @@ Examination examine(const fit::Fit& fit, const measurement::Measurement& measure
   found.metrics.update(
       evaluate::artefacts_json(found.verdict.artefacts.speckle, found.verdict.artefacts.faces));
   found.metrics["verdict"] = verdict::verdict_json(found.verdict);
-  found.metrics["alignment"] = run.options.alignment;
+  found.metrics["alignment"] =
+      run.options.alignment ? alignment::to_json(*run.options.alignment) : nlohmann::json(nullptr);
   found.metrics["tuning"] = tuned ? tune::tuning_json(*tuned) : nlohmann::json(nullptr);
   return found;
 }

@@ -35,9 +35,9 @@ bool can_resume(const options::ReconstructOptions& options, const output::Output
                                 (options.may_use_tiles() && has(paths.tiles)));
 }
 
-// Returns the files that the run writes, but for the pictures of slices.
-std::vector<std::filesystem::path> files_without_slices(const options::ReconstructOptions& options,
-                                                        const output::OutputPaths& paths) {
+// Returns the files that the run writes.
+std::vector<std::filesystem::path> files_of(const options::ReconstructOptions& options,
+                                            const output::OutputPaths& paths) {
   std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json, paths.report};
   if (options.field.tree == TreeKind::kAdaptive) results.push_back(paths.tree_picture);
   if (options.may_use_tiles()) results.push_back(paths.tiles);
@@ -49,6 +49,7 @@ std::vector<std::filesystem::path> files_without_slices(const options::Reconstru
   if (options.chooses_weight()) results.push_back(paths.dial_picture);
   if (options.open_settings().prior) results.push_back(paths.prior_picture);
   for (const auto& file : exchange::exchange_files(options)) results.push_back(file);
+  for (const auto& picture : paths.pictures()) results.push_back(picture);
   return results;
 }
 
@@ -62,8 +63,7 @@ std::vector<std::filesystem::path> optional_pictures(const output::OutputPaths& 
 std::vector<std::filesystem::path> result_files(const options::ReconstructOptions& options) {
   if (options.run.output.empty()) return {};
   const output::OutputPaths paths = output::output_paths(options.run.output);
-  std::vector<std::filesystem::path> files = files_without_slices(options, paths);
-  for (const auto& picture : io::picture_files(paths.picture_prefix)) files.push_back(picture);
+  std::vector<std::filesystem::path> files = files_of(options, paths);
   if (options.volume.zarr) files.push_back(output::zarr_path(paths.volume));
   return files;
 }
@@ -80,8 +80,8 @@ void check_options(const options::ReconstructOptions& options) {
             "replace it, or another name with -o"
           : "give --overwrite to replace it, --resume to continue the run that made "
             "it, or another name with -o";
-  io::check_result_files(files_without_slices(options, paths), paths.picture_prefix, options.files,
-                         may_replace, advice);
+  io::check_output_files(files_of(options, paths), io::input_files(options.files), may_replace,
+                         advice);
   if (options.volume.zarr) output::check_zarr(paths.volume, may_replace, advice);
 }
 

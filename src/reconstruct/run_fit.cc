@@ -6,10 +6,10 @@
 #include <string>
 
 #include "base/log.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 #include "base/trace.h"
 #include "checkpoint/checkpoint.h"
-#include "options/denoise_factor.h"
+#include "options/run_options.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {

@@ -24,6 +24,7 @@ void write_report(const Run& run, const io::OutputSet& outputs, const RunResult&
                       report::run_report({.record = result.metrics,
                                           .files = run.options.files,
                                           .options = run.options,
+                                          .alignment = run.options.alignment,
                                           .volume = outputs.location_of(run.paths.volume),
                                           .pictures = pictures}));
 }
@@ -33,12 +34,12 @@ void write_report(const Run& run, const io::OutputSet& outputs, const RunResult&
 void write_pages(const Run& run, const io::OutputSet& outputs, RunResult& result) {
   const output::OutputPaths& paths = run.paths;
   const fs::path volume = outputs.location_of(paths.volume);
-  result.pictures =
-      report::write_run_pictures(volume, run.series, result.bead_masking, paths.picture_prefix);
+  report::write_run_pictures(volume, run.series, result.bead_masking, paths);
+  result.pictures = paths.pictures();
   exchange::write_exchange_files(run.series, run.options, volume);
   // Trials draw theirs before the fit.
   report::ReportPictures shown{
-      .mask = outputs.location_of(result.pictures.back()),
+      .mask = outputs.location_of(paths.mask_picture),
       .tree = {},
       .held_out = {},
       .dial = if_there(paths.dial_picture, run.options.chooses_weight()),

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/log.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 #include "base/system/memory.h"
 #include "base/trace.h"
 #include "checkpoint/finished_tiles.h"
@@ -18,9 +18,10 @@
 #include "compact/compress.h"
 #include "compact/decoded_field.h"
 #include "fit/fit.h"
-#include "options/denoise_factor.h"
+#include "options/run_options.h"
 #include "reconstruct/run_fit.h"
 #include "tomofield/error.h"
+#include "verdict/verdict_record.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -93,13 +94,12 @@ class TileFits {
     if (!take_steps(tile, *fit)) return false;
     const double seconds_fitting = running.seconds();
     fit->free_optimizer();  // the verdict needs the memory
-    nlohmann::json tile_json{{"rows", {tile.own.begin, tile.own.end}},
-                             {"fitted_rows", {tile.fitted.begin, tile.fitted.end}},
-                             {"residual", fit->progress().data_loss.back()},
-                             {"held_out_error", nullptr},
-                             {"seconds_fitting", seconds_fitting}};
+    checkpoint::FinishedTile done{.rows = tile.own,
+                                  .fitted_rows = tile.fitted,
+                                  .residual = fit->progress().data_loss.back(),
+                                  .seconds_fitting = seconds_fitting};
     if (!rays.held_out.empty())
-      tile_json["held_out_error"] = fit->held_out_error(run_.options.fit.fit_view_scale).total;
+      done.held_out_error = fit->held_out_error(run_.options.fit.fit_view_scale).total;
     if (example != nullptr) {
       Examination found = examine(*fit, rays, run_, record_);
       auto view = central_held_out_view(*fit, rays, found);
@@ -107,7 +107,11 @@ class TileFits {
     }
     std::unique_ptr<field::Field> vertices = fit->take_field();
     fit.reset();  // compression needs the memory
-    finished_.add(tile.own, compressed(tile, std::move(vertices)), std::move(tile_json));
+    const base::Stopwatch compressing;
+    compact::CompactField made = compressed(tile, std::move(vertices));
+    done.seconds_compressing = compressing.seconds();
+    done.report = made.report;
+    finished_.add(done, std::move(made.coded));
     return true;
   }
 
@@ -138,9 +142,8 @@ class TileFits {
   }
 
   // Replaces the own rows of a tile by codes, with the budget's share of these rows.
-  checkpoint::TileCodes compressed(const plan::Tile& tile,
+  compact::CompactField compressed(const plan::Tile& tile,
                                    std::unique_ptr<field::Field> vertices) const {
-    const base::Stopwatch running;
     compact::Budget budget = compact::parse_budget(run_.options.field.budget);
     if (budget.kind != compact::Budget::Kind::kDecibels)
       budget.amount *= static_cast<double>(tile.own.size()) / num_rows_;
@@ -151,10 +154,9 @@ class TileFits {
       rows.end = static_cast<int>(roots.y0 + roots.rows * roots.cell_size);
     }
     const output::ModelInfo info = checkpoint::model_info(run_.measurement, run_.options);
-    compact::CompactField made = compact::compress(
+    return compact::compress(
         *vertices, run_.measurement.roi, budget, rows, start_.variance,
         [&](const compact::CodedField& coded) { return output::coded_file_size(coded, info); });
-    return {std::move(made.coded), made.report, running.seconds()};
   }
 
   const Run& run_;
@@ -185,18 +187,18 @@ nlohmann::json metrics_of(const Run& run, const Example& example,
   metrics["leaves"] = finished.coded().tree.num_leaves();
   metrics["verdict"] = verdict::verdict_json(verdict);
   metrics["example_tile"] = {example.tile.own.begin, example.tile.own.end};
-  metrics["tiles"] = finished.tiles_json();
-  metrics["compact"] =
-      compact::report_json(finished.report(), finished.sum_of("seconds_compressing"));
+  metrics["tiles"] = checkpoint::to_json(finished.tiles());
+  metrics["compact"] = output::compact_json(
+      finished.report(), finished.sum_of(&checkpoint::FinishedTile::seconds_compressing));
   return metrics;
 }
 
 // Writes the results of a run whose tiles are all finished.
 RunResult finish_tiles(const Run& run, FitRecord& record, checkpoint::FinishedTiles& finished,
                        Example example, double seconds_of_coarse) {
-  record.seconds = seconds_of_coarse + finished.sum_of("seconds_fitting");
+  record.seconds = seconds_of_coarse + finished.sum_of(&checkpoint::FinishedTile::seconds_fitting);
   verdict::Verdict& verdict = example.found.verdict;
-  verdict.residual = finished.mean_of("residual");
+  verdict.residual = finished.mean_of(&checkpoint::FinishedTile::residual);
   verdict.seconds = run.options.since_start.seconds();
   verdict.peak_GiB = static_cast<double>(base::peak_memory()) / (1 << 30);
   RunResult result{

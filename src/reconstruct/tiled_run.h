@@ -1,6 +1,6 @@
 #pragma once
 
-#include "plan/tiles.h"
+#include "plan/tile_plan.h"
 #include "reconstruct/results.h"
 #include "reconstruct/run.h"
 

@@ -15,16 +15,11 @@ constexpr const char* kAcross = "across the tilt axis (x)";
 constexpr const char* kAlong = "along the tilt axis (y)";
 constexpr int kHeight_px = 270;
 
-// Returns the root mean square of the displacements [row][column] = (x, y) of the nodes.
-double rms_of(const nlohmann::json& nodes) {
-  double squares = 0.0, count = 0.0;
-  for (const nlohmann::json& row : nodes) {
-    for (const nlohmann::json& node : row) {
-      squares += std::pow(node[0].get<double>(), 2) + std::pow(node[1].get<double>(), 2);
-      count += 1.0;
-    }
-  }
-  return std::sqrt(squares / count);
+// Returns the root mean square of the displacements of the nodes.
+double rms_of(const geometry::ViewWarp& motion) {
+  double squares = 0.0;
+  for (const auto& [x, y] : motion.nodes) squares += x * x + y * y;
+  return std::sqrt(squares / static_cast<double>(motion.nodes.size()));
 }
 
 // Returns the values of the views in order of tilt.
@@ -69,20 +64,19 @@ bool has_change(const std::vector<double>& values) {
 
 }  // namespace
 
-AlignmentCurves alignment_curves(const nlohmann::json& record) {
+AlignmentCurves alignment_curves(const alignment::AlignmentRecord& record) {
   AlignmentCurves curves;
-  for (const nlohmann::json& view : record["views"]) {
-    curves.tilt_deg.push_back(view["tilt_deg"]);
-    curves.shift_x_px.push_back(view["shift_px"][0]);
-    curves.shift_y_px.push_back(view["shift_px"][1]);
-    curves.rotation_deg.push_back(view["rotation_deg"]);
-    curves.magnification_percent.push_back(100 *
-                                           std::expm1(view["log_magnification"].get<double>()));
-    curves.tilt_change_deg.push_back(view["tilt_change_deg"]);
-    curves.local_px.push_back(view.contains("local_px") ? rms_of(view["local_px"]) : 0.0);
-    curves.correlation.push_back(view["correlation"]);
-    curves.error_x_px.push_back(view["shift_error_px"][0]);
-    curves.error_y_px.push_back(view["shift_error_px"][1]);
+  for (const alignment::AlignedView& view : record.views) {
+    curves.tilt_deg.push_back(view.tilt_deg);
+    curves.shift_x_px.push_back(view.shift_px[0]);
+    curves.shift_y_px.push_back(view.shift_px[1]);
+    curves.rotation_deg.push_back(view.rotation_deg);
+    curves.magnification_percent.push_back(100 * std::expm1(view.log_magnification));
+    curves.tilt_change_deg.push_back(view.tilt_change_deg);
+    curves.local_px.push_back(view.local ? rms_of(*view.local) : 0.0);
+    curves.correlation.push_back(view.agreement.correlation);
+    curves.error_x_px.push_back(view.agreement.error_px[0]);
+    curves.error_y_px.push_back(view.agreement.error_px[1]);
   }
   return curves;
 }

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <vector>
 
+#include "align/alignment_record.h"
 #include "report/curve_plot.h"
 
 namespace tomofield::report {
@@ -22,8 +22,8 @@ struct AlignmentCurves {
   std::vector<double> error_x_px, error_y_px;  ///< standard errors of the shift
 };
 
-/// Returns the curves of an alignment as the metrics of a run have it (realign/alignment_record.h).
-AlignmentCurves alignment_curves(const nlohmann::json& record);
+/// Returns the curves of an alignment.
+AlignmentCurves alignment_curves(const alignment::AlignmentRecord& record);
 
 /// Returns plots over the tilt: shift, rotation, magnification, tilt angle, local motion,
 /// correlation, and standard error of the shift. A rotation, a magnification, a change of the tilt

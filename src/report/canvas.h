@@ -9,6 +9,7 @@
 namespace tomofield::report {
 
 using Colour = std::array<std::uint8_t, 3>;
+inline constexpr Colour kWhite{255, 255, 255}, kBlack{0, 0, 0};
 
 /// A picture that can be drawn on. x runs to the right and y upwards from the lower left corner.
 class Canvas {

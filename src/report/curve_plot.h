@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/html.h"
+#include "base/code_text.h"
 
 namespace tomofield::report {
 

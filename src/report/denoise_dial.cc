@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <set>
 
-#include "options/denoise_factor.h"
+#include "options/run_options.h"
 #include "report/trial_sections.h"
 
 namespace tomofield::report {

@@ -7,8 +7,8 @@
 #include "base/threads/parallel.h"
 #include "io/images/jpeg.h"
 #include "io/images/mrc.h"
-#include "report/base64.h"
 #include "report/contrast.h"
+#include "report/page_picture.h"
 #include "report/reduced_volume.h"
 
 namespace tomofield::report {

@@ -10,7 +10,6 @@
 
 #include "io/images/jpeg.h"
 #include "io/images/png.h"
-#include "report/base64.h"
 #include "tomofield/error.h"
 
 namespace tomofield::report {
@@ -61,6 +60,24 @@ std::string page_picture(const std::filesystem::path& png) {
   const io::RgbImage small = reduced(image, factor);
   return "data:image/jpeg;base64," +
          base64(io::jpeg_rgb(small.width, small.height, small.pixels, kQuality));
+}
+
+std::string base64(std::string_view bytes) {
+  constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      group <<= 8;
+      if (k < count) group |= static_cast<unsigned char>(bytes[i + k]);
+    }
+    for (std::size_t k = 0; k < 4; ++k)
+      text += k <= count ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
 }
 
 }  // namespace tomofield::report

@@ -12,11 +12,12 @@
 #include "base/statistics.h"
 #include "base/threads/parallel.h"
 #include "base/trace.h"
-#include "field/sampling/middle_plane.h"
+#include "field/sampling/sample_box.h"
 #include "io/images/png.h"
 #include "report/canvas.h"
 #include "report/contrast.h"
 #include "report/slice.h"
+#include "report/trial_sections.h"
 
 namespace tomofield::report {
 namespace {
@@ -82,23 +83,28 @@ std::uint8_t grey_of(double value, double black, double range) {
       std::lround(std::clamp((value - black) / range, 0.0, 1.0) * 255.0));
 }
 
+// Returns what `with` has more than `without`, around the middle of the contrast of that: where
+// nothing changes, it is a middle grey.
+tune::Section difference_of(const tune::Section& with, const tune::Section& without) {
+  tune::Section difference = with;
+  const Contrast contrast = contrast_of(without.values);
+  const auto middle = static_cast<float>((contrast.black + contrast.white) / 2);
+  for (std::size_t i = 0; i < difference.values.size(); ++i)
+    difference.values[i] += middle - without.values[i];
+  return difference;
+}
+
 }  // namespace
 
-std::vector<std::filesystem::path> write_run_pictures(const std::filesystem::path& volume,
-                                                      const tilt_series::TiltSeries& series,
-                                                      tilt_series::BeadMasking bead_masking,
-                                                      const std::filesystem::path& prefix) {
+void write_run_pictures(const std::filesystem::path& volume, const tilt_series::TiltSeries& series,
+                        tilt_series::BeadMasking bead_masking, const output::OutputPaths& paths) {
   const base::TraceSpan span("draw pictures");
-  std::vector<std::filesystem::path> pictures;
-  const std::filesystem::path mask = prefix.string() + "_mask.png";
   base::parallel_for("draw pictures", 2, [&](std::int64_t i) {
     if (i == 0)
-      pictures = write_slice_pictures(volume, prefix);
+      write_slice_pictures(volume, paths.slice_pictures);
     else
-      write_mask_picture(series, bead_masking, mask);
+      write_mask_picture(series, bead_masking, paths.mask_picture);
   });
-  pictures.push_back(mask);
-  return pictures;
 }
 
 void write_mask_picture(const tilt_series::TiltSeries& series,
@@ -203,6 +209,19 @@ void write_held_out_picture(const measurement::PredictedView& view,
     }
   }
   io::write_png_grey(path, width, view.height, pixels);
+}
+
+void write_prior_picture(const tune::TunedFit& tuned, double output_scale,
+                         const std::filesystem::path& path) {
+  std::vector<CaptionedSection> shown;
+  if (!tuned.last_trials.empty() && !tuned.last_trials.front().section.values.empty()) {
+    const tune::Section& without = tuned.last_trials.front().section;
+    const tune::Section& with = tuned.last_trials.back().section;
+    shown = {{without, "Total variation alone"},
+             {with, "With the learned prior"},
+             {difference_of(with, without), "What the prior adds"}};
+  }
+  draw_sections(shown, 0, output_scale, path);
 }
 
 }  // namespace tomofield::report

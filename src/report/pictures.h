@@ -6,8 +6,10 @@
 #include "evaluate/resolution/fsc.h"
 #include "measurement/held_out.h"
 #include "output/model_file.h"
+#include "output/output_paths.h"
 #include "report/curve_plot.h"
 #include "tilt_series/tilt_series.h"
+#include "tune/trial_settings.h"
 
 namespace tomofield::report {
 
@@ -19,12 +21,9 @@ void write_mask_picture(const tilt_series::TiltSeries& series,
                         tilt_series::BeadMasking bead_masking, const std::filesystem::path& path);
 
 /// Draws the central slices of a volume (slice.h) and the masks of its series
-/// (write_mask_picture()), under names that begin with `prefix`. Returns their paths; that of the
-/// masks is the last one.
-std::vector<std::filesystem::path> write_run_pictures(const std::filesystem::path& volume,
-                                                      const tilt_series::TiltSeries& series,
-                                                      tilt_series::BeadMasking bead_masking,
-                                                      const std::filesystem::path& prefix);
+/// (write_mask_picture()): OutputPaths::pictures().
+void write_run_pictures(const std::filesystem::path& volume, const tilt_series::TiltSeries& series,
+                        tilt_series::BeadMasking bead_masking, const output::OutputPaths& paths);
 
 /// Draws the leaves of a model: the central XY slice of its region of interest in grey (x to the
 /// right, y upwards; greys as in write_slice_pictures(), densities as the model holds them), with
@@ -53,5 +52,11 @@ void write_fsc_picture(const evaluate::Fsc& fsc, const std::filesystem::path& pa
 /// cannot be written.
 void write_held_out_picture(const measurement::PredictedView& view,
                             const std::filesystem::path& path);
+
+/// Draws what the learned prior changes: a section of the trial without it, of the trial with it,
+/// and their difference (trial_sections.h). Removes the file and draws nothing if the trials have
+/// no sections, as those that a resumed run reads.
+void write_prior_picture(const tune::TunedFit& tuned, double output_scale,
+                         const std::filesystem::path& path);
 
 }  // namespace tomofield::report

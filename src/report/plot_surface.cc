@@ -12,7 +12,6 @@ namespace tomofield::report {
 namespace {
 
 constexpr int kFontSize = 13;  // pixels, of SVG texts
-constexpr Colour kWhite{255, 255, 255}, kBlack{0, 0, 0};
 
 std::int64_t nearest(double value) { return std::lround(value); }
 

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "base/html.h"
+#include "base/code_text.h"
 #include "report/canvas.h"
 
 namespace tomofield::report {

@@ -1,4 +1,4 @@
-#include "report/prior_picture.h"
+#include "report/pictures.h"
 
 #include <gtest/gtest.h>
 

@@ -8,11 +8,11 @@
 #include <utility>
 
 #include "base/statistics.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "report/choice_plot.h"
 #include "report/curve_plot.h"
 #include "report/pictures.h"
-#include "tune/trial_settings.h"
+#include "tune/trial_record.h"
 
 namespace tomofield::report {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "base/html.h"
+#include "base/code_text.h"
 
 namespace tomofield::report {
 

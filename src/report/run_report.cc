@@ -12,7 +12,7 @@
 #include "base/trace.h"
 #include "base/version.h"
 #include "io/images/mrc.h"
-#include "io/json_numbers.h"
+#include "io/json.h"
 #include "report/alignment_plot.h"
 #include "report/embedded_volume.h"
 #include "report/html.h"
@@ -104,31 +104,27 @@ std::vector<HtmlFact> facts_of_size(const AllFits& fits, const EmbeddedVolume& v
 }
 
 // Adds how far gold beads lie from their places, if an alignment followed some.
-void add_beads(const json& alignment, std::vector<HtmlFact>& facts) {
-  if (!alignment.is_object() || !alignment.contains("beads")) return;
-  const json &beads = alignment.at("beads"), &distance_px = beads.at("distance_px");
-  const bool is_new = alignment.at("accepted").get<bool>();
-  const char* of_new = beads.at("accepted").get<bool>() ? "after" : "before";
+void add_beads(const alignment::AlignmentRecord& alignment, std::vector<HtmlFact>& facts) {
+  if (!alignment.beads) return;
+  const alignment::BeadRecord& beads = *alignment.beads;
+  const double new_px = beads.is_accepted ? beads.after_px : beads.before_px;
+  const bool is_new = alignment.is_accepted;
   facts.push_back(
-      {"Gold beads",
-       fmt::format("{:.2f} px", io::number_or_nan(distance_px.at(is_new ? of_new : "files"))),
+      {"Gold beads", fmt::format("{:.2f} px", is_new ? new_px : beads.files_px),
        fmt::format("{} beads lie so far from their places (root mean square in x and y). With the "
                    "alignment {}: {:.2f} px.",
-                   beads.at("beads").get<int>(),
-                   is_new ? "of the files" : "that was tried and not taken",
-                   io::number_or_nan(distance_px.at(is_new ? "files" : of_new)))});
+                   beads.num_beads, is_new ? "of the files" : "that was tried and not taken",
+                   is_new ? beads.files_px : new_px)});
 }
 
 // Adds what an alignment found of the specimen's pose.
-void add_pose(const json& alignment, std::vector<HtmlFact>& facts) {
-  if (!alignment.is_object() || !alignment.contains("pose")) return;
-  const json& pose = alignment.at("pose");
+void add_pose(const alignment::AlignmentRecord& alignment, std::vector<HtmlFact>& facts) {
+  if (!alignment.pose) return;
+  const auto& [pose, error] = *alignment.pose;
   facts.push_back(
       {"Thickness and pitch",
-       fmt::format(
-           "{:.0f} ± {:.0f} px, {:.1f} ± {:.1f}°", io::number_or_nan(pose.at("thickness_px")),
-           io::number_or_nan(pose.at("thickness_error_px")),
-           io::number_or_nan(pose.at("pitch_deg")), io::number_or_nan(pose.at("pitch_error_deg"))),
+       fmt::format("{:.0f} ± {:.0f} px, {:.1f} ± {:.1f}°", pose.thickness_px, error.thickness_px,
+                   pose.pitch_deg, error.pitch_deg),
        "What the specimen seems to have, in unbinned pixels, and in degrees against the tilt "
        "angles. "
        "Noisy views give rough values, whatever their errors say: look at the XZ plane first. The "
@@ -149,7 +145,8 @@ void add_prior(const json& prior, std::vector<HtmlFact>& facts) {
   facts.push_back({"Learned prior", is_used ? "yes" : "no", note});
 }
 
-std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics) {
+std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics,
+                                   const std::optional<alignment::AlignmentRecord>& alignment) {
   std::vector<HtmlFact> facts;
   facts.push_back({"Residual", fmt::format("{:.2f}", io::number_or_nan(verdict.at("residual"))),
                    "What the tomogram leaves of the views, over the noise's variance: about 1 if "
@@ -170,8 +167,10 @@ std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics) {
                      fmt::format("{:.2g} px", io::number_or_nan(views.at("usual_displacement_px"))),
                      "9 of 10 views lie closer than this to where the tomogram predicts them."});
   }
-  add_beads(metrics.value("alignment", json()), facts);
-  add_pose(metrics.value("alignment", json()), facts);
+  if (alignment) {
+    add_beads(*alignment, facts);
+    add_pose(*alignment, facts);
+  }
   if (const double speckle = io::number_or_nan(verdict.value("speckle", json()));
       std::isfinite(speckle))
     facts.push_back(
@@ -280,20 +279,17 @@ void add_plot(const char* heading, const char* text, const base::Html& svg, Html
   page.add_svg(svg, text);
 }
 
-// Adds what the alignment before the fit found, if there was one.
-void add_alignment(const json& metrics, HtmlPage& page) {
-  const auto record = metrics.find("alignment");
-  if (record == metrics.end() || !record->is_object()) return;
-  const json& error = record->at("held_out_error");
+// Adds what the alignment before the fit found.
+void add_alignment(const alignment::AlignmentRecord& record, HtmlPage& page) {
   page.add_heading("Views: alignment before the fit");
   page.add_paragraph(fmt::format(
       "The views were aligned with the projections of a field that was fitted to all of them. "
       "Views that such a field did not see are predicted with an error of {:.4f} of their "
       "variance; with the alignment of the files it is {:.4f}. {}",
-      error.at("after").get<double>(), error.at("before").get<double>(),
-      record->at("accepted").get<bool>() ? "So the new alignment is used."
-                                         : "So the alignment of the files is kept."));
-  for (const CurvePlot& plot : alignment_plots(alignment_curves(*record)))
+      record.held_out.after, record.held_out.before,
+      record.is_accepted ? "So the new alignment is used."
+                         : "So the alignment of the files is kept."));
+  for (const CurvePlot& plot : alignment_plots(alignment_curves(record)))
     page.add_svg(curve_plot_svg(plot.axes, plot.curves), "");
 }
 
@@ -350,7 +346,7 @@ void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
       trials_plot(fits.front().metrics), page);
   add_dial(source, page);
   add_prior_picture(source, page);
-  add_alignment(fits.front().metrics, page);
+  if (source.alignment) add_alignment(*source.alignment, page);
   add_plot("Loss",
            "The fit begins with coarse pixels, whose noise is lower; the curves jump where it goes "
            "on with finer ones. Held-out views that get worse while the fitted ones improve would "
@@ -433,7 +429,7 @@ std::string run_report(const ReportSource& source) {
                                  base::source_commit()));
   add_verdict(verdict, page);
   std::vector<HtmlFact> facts = facts_of_size(fits, volume);
-  std::ranges::move(facts_of_fit(verdict, metrics), std::back_inserter(facts));
+  std::ranges::move(facts_of_fit(verdict, metrics, source.alignment), std::back_inserter(facts));
   page.add_facts(facts);
   add_volume(source.record, volume, page);
   add_input(source, page);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "align/alignment_record.h"
 #include "tomofield/options.h"
 
 namespace tomofield::report {
@@ -20,6 +21,7 @@ struct ReportSource {
   const nlohmann::json& record;  ///< the content of the JSON file beside the volume
   const SeriesFiles& files;      ///< of the series
   const Options& options;        ///< as the run used them
+  const std::optional<alignment::AlignmentRecord>& alignment;  ///< before the fit, if there was one
   std::filesystem::path volume;  ///< the file that holds the tomogram (MRC)
   ReportPictures pictures;
 };

@@ -65,6 +65,7 @@ class RunReport : public ::testing::Test {
     return run_report({.record = record_,
                        .files = files_,
                        .options = options_,
+                       .alignment = alignment_,
                        .volume = directory_ / "volume.mrc",
                        .pictures = {.mask = directory_ / "mask.png",
                                     .tree = {},
@@ -77,6 +78,7 @@ class RunReport : public ::testing::Test {
   const testing::ScratchDirectory directory_;
   SeriesFiles files_;
   Options options_;
+  std::optional<alignment::AlignmentRecord> alignment_;
   json record_;
 };
 
@@ -102,31 +104,24 @@ TEST_F(RunReport, SaysWhetherTheLearnedPriorHelped) {
 
 TEST_F(RunReport, ShowsHowFarGoldBeadsLieFromTheirPlacesAndThePose) {
   EXPECT_FALSE(page_has("Gold beads"));
-  json& alignment = record_["metrics"]["alignment"];
-  alignment = {{"accepted", true},
-               {"held_out_error", {{"before", 0.2}, {"after", 0.1}}},
-               {"beads",
-                {{"beads", 12},
-                 {"accepted", true},
-                 {"distance_px", {{"files", 1.25}, {"before", 0.5}, {"after", 0.25}}}}},
-               {"views", json::array()}};
+  alignment_ = {.is_accepted = true,
+                .held_out = {.before = 0.2, .after = 0.1, .gain = {}},
+                .beads = alignment::BeadRecord{.num_beads = 12,
+                                               .files_px = 1.25,
+                                               .before_px = 0.5,
+                                               .after_px = 0.25,
+                                               .is_accepted = true}};
   for (const double tilt_deg : {10.0, 20.0})
-    alignment["views"].push_back({{"tilt_deg", tilt_deg},
-                                  {"shift_px", {1.0, 2.0}},
-                                  {"rotation_deg", 0.0},
-                                  {"log_magnification", 0.0},
-                                  {"tilt_change_deg", 0.0},
-                                  {"correlation", 0.9},
-                                  {"shift_error_px", {0.1, 0.1}}});
+    alignment_->views.push_back({.tilt_deg = tilt_deg,
+                                 .shift_px = {1.0, 2.0},
+                                 .agreement = {.correlation = 0.9, .error_px = {0.1, 0.1}}});
   EXPECT_FALSE(page_has("Thickness and pitch"));
-  alignment["pose"] = {{"thickness_px", 190.2},
-                       {"thickness_error_px", 18.0},
-                       {"pitch_deg", -4.7},
-                       {"pitch_error_deg", 0.8}};
+  alignment_->pose = {.pose = {.thickness_px = 190.2, .pitch_deg = -4.7},
+                      .error = {.thickness_px = 18.0, .pitch_deg = 0.8}};
   EXPECT_TRUE(page_has("190 ± 18 px, -4.7 ± 0.8°"));
   EXPECT_TRUE(page_has("0.25 px"));
   EXPECT_TRUE(page_has("of the files: 1.25 px"));
-  alignment["accepted"] = false;
+  alignment_->is_accepted = false;
   EXPECT_TRUE(page_has("1.25 px"));
   EXPECT_TRUE(page_has("not taken: 0.25 px"));
 }

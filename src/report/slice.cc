@@ -73,19 +73,16 @@ std::int64_t picture_zoom(std::int64_t narrowest, std::int64_t widest) {
                                   std::max<std::int64_t>(kMaxWidth_px / widest, 1));
 }
 
-std::vector<std::filesystem::path> write_slice_pictures(const std::filesystem::path& mrc,
-                                                        const std::filesystem::path& prefix) {
+void write_slice_pictures(const std::filesystem::path& mrc,
+                          const std::array<std::filesystem::path, 3>& pictures) {
   const auto slices = read_central_slices(mrc);
   const GreyScale scale(contrast_of(io::MrcReader(mrc)));
   const auto [narrowest, widest] = std::minmax({slices[0].width, slices[2].width});
   const std::int64_t zoom = picture_zoom(narrowest, widest);
-  std::vector<std::filesystem::path> paths;
-  for (const Slice& slice : slices) paths.emplace_back(prefix.string() + "_" + slice.name + ".png");
   base::parallel_for("draw slices", std::ssize(slices), [&](std::int64_t i) {
     const auto slice = static_cast<std::size_t>(i);
-    write_slice_picture(paths[slice], slices[slice], scale, zoom);
+    write_slice_picture(pictures[slice], slices[slice], scale, zoom);
   });
-  return paths;
 }
 
 }  // namespace tomofield::report

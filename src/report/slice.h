@@ -47,15 +47,14 @@ std::vector<Slice> read_central_slices(const std::filesystem::path& mrc);
 void write_slice_picture(const std::filesystem::path& path, const Slice& slice,
                          const GreyScale& scale, std::int64_t zoom);
 
-/// Draws the three central planes of an MRC volume: PREFIX_xy.png, PREFIX_xz.png and PREFIX_yz.png
-/// (the file's own axes). The first axis of each name runs to the right, the second upwards, as in
-/// 3dmod. One grey scale serves all three, the contrast of the volume (contrast.h), densities as
-/// stored. Voxels stay square. Small volumes are enlarged,
-/// whole pixels a voxel, until each picture is at least 512 pixels wide (unless another would then
-/// be wider than 4096).
+/// Draws the three central planes of an MRC volume, xy, xz and yz (the file's own axes). The first
+/// axis of each name runs to the right, the second upwards, as in 3dmod. One grey scale serves all
+/// three, the contrast of the volume (contrast.h), densities as stored. Voxels stay square. Small
+/// volumes are enlarged, whole pixels a voxel, until each picture is at least 512 pixels wide
+/// (unless another would then be wider than 4096).
 ///
-/// Reads the file once, rows at a time. Returns the three paths. Replaces files.
-std::vector<std::filesystem::path> write_slice_pictures(const std::filesystem::path& mrc,
-                                                        const std::filesystem::path& prefix);
+/// Reads the file once, rows at a time. Replaces files.
+void write_slice_pictures(const std::filesystem::path& mrc,
+                          const std::array<std::filesystem::path, 3>& pictures);
 
 }  // namespace tomofield::report

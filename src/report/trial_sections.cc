@@ -14,7 +14,6 @@ namespace {
 
 constexpr std::int64_t kCaption_px = 28;  // height of the caption above a section
 constexpr std::int64_t kTextAboveSection_px = 6;
-constexpr Colour kWhite{255, 255, 255}, kBlack{0, 0, 0};
 
 // Draws a section with its caption above it; `bottom` is the row of its lower edge.
 void draw_section(const CaptionedSection& shown, double output_scale, const GreyScale& scale,

@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "base/random.h"
-#include "microscope/defocus_slope.h"
+#include "microscope/view_transfer.h"
 
 namespace tomofield::simulate {
 namespace {

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "base/random.h"
-#include "geometry/imod_transform.h"
+#include "geometry/raw_from_aligned.h"
 
 namespace tomofield::simulate {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "geometry/imod_transform.h"
+#include "geometry/raw_from_aligned.h"
 
 namespace tomofield::simulate {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "geometry/imod_transform.h"
+#include "geometry/raw_from_aligned.h"
 #include "simulate/gaussian_rows.h"
 #include "simulate/line_integrals.h"
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/statistics.h"
-#include "geometry/imod_transform.h"
+#include "geometry/raw_from_aligned.h"
 #include "io/images/mrc.h"
 #include "io/json.h"
 #include "io/saving/atomic_file.h"

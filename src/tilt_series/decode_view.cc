@@ -40,26 +40,8 @@ std::size_t decoding_memory(double raw_pixels, double bin_factor) {
          BandLimitedImage::memory(raw_pixels);
 }
 
-ViewDecoder::ViewDecoder(const io::ImageStack& stack, const SeriesPlan& plan, Contrast contrast,
-                         std::optional<io::MrcReader> mask)
-    : stack_(stack), plan_(plan), contrast_(contrast), mask_(std::move(mask)) {}
-
-std::int64_t ViewDecoder::recorded_width() const {
-  return reduced_size(stack_.header().nx, plan_.bin_factor);
-}
-std::int64_t ViewDecoder::recorded_height() const {
-  return reduced_size(stack_.header().ny, plan_.bin_factor);
-}
-std::int64_t ViewDecoder::aligned_width() const {
-  return reduced_size(plan_.aligned_width, plan_.bin_factor);
-}
-std::int64_t ViewDecoder::aligned_height() const {
-  return reduced_size(plan_.aligned_height, plan_.bin_factor);
-}
-
-std::size_t ViewDecoder::memory() const {
-  const auto& header = stack_.header();
-  return decoding_memory(static_cast<double>(header.nx * header.ny), plan_.bin_factor);
+ViewDecoder::ViewDecoder(PlannedSeries series) : series_(std::move(series)) {
+  if (series_.options().mask) mask_ = open_mask(*series_.options().mask, series_.stack());
 }
 
 DecodedView ViewDecoder::decode(std::size_t view, Frames frames, PatternSearch* search) const {
@@ -74,7 +56,7 @@ DecodedView ViewDecoder::decode(std::size_t view, Frames frames, PatternSearch* 
 DecodedView ViewDecoder::decode_half(Half half, const HalfStacks& halves, std::size_t view,
                                      Frames frames) const {
   MaskedImage image = read_masked(view);
-  halves.read_section(half, plan_.views[view].view.section, image.values);
+  halves.read_section(half, series_.plan().views[view].view.section, image.values);
   for (std::size_t i = 0; i < image.values.size(); ++i)
     if (image.valid[i] == kNoMeasurement) image.values[i] = 0.0f;
   return decode_masked(std::move(image), view, frames);
@@ -87,11 +69,12 @@ MaskedImage ViewDecoder::read_masked(std::size_t view) const {
 
 // Reads the section of a view and masks what is no measurement.
 MaskedImage ViewDecoder::read_and_mask(std::size_t view, PixelCensus& census) const {
-  const std::int64_t section = plan_.views[view].view.section;
-  MaskedImage image(stack_.header().nx, stack_.header().ny);
-  stack_.read_section(section, image.values);
+  const std::int64_t section = series_.plan().views[view].view.section;
+  const io::ImageStack& stack = series_.stack();
+  MaskedImage image(stack.header().nx, stack.header().ny);
+  stack.read_section(section, image.values);
   census = mask_unusable(&image);
-  if (!plan_.is_raw) mask_fill(contrast_, &image);
+  if (!series_.plan().is_raw) mask_fill(series_.options().contrast, &image);
   if (mask_) apply_mask(*mask_, section, &image);
   census.num_bad = mask_bad_pixels(&image);
   return image;
@@ -107,16 +90,18 @@ DecodedView ViewDecoder::decode_masked(MaskedImage image, std::size_t view, Fram
 }
 
 MaskedImage ViewDecoder::aligned(MaskedImage recorded, std::size_t view) const {
-  const PlannedView& planned = plan_.views[view];
+  const SeriesPlan& plan = series_.plan();
+  const PlannedView& planned = plan.views[view];
   const bool keeps_sizes =
-      plan_.aligned_width == recorded.width && plan_.aligned_height == recorded.height;
+      plan.aligned_width == recorded.width && plan.aligned_height == recorded.height;
   if (planned.raw_from_aligned.is_identity() && !planned.local && keeps_sizes) return recorded;
-  return align_image(recorded, planned.raw_from_aligned, plan_.aligned_width, plan_.aligned_height,
+  return align_image(recorded, planned.raw_from_aligned, plan.aligned_width, plan.aligned_height,
                      planned.local);
 }
 
 MaskedImage ViewDecoder::binned(MaskedImage image) const {
-  return plan_.bin_factor == 1.0 ? std::move(image) : reduce_image(image, plan_.bin_factor);
+  const double factor = series_.bin_factor();
+  return factor == 1.0 ? std::move(image) : reduce_image(image, factor);
 }
 
 }  // namespace tomofield::tilt_series

@@ -5,14 +5,12 @@
 #include <optional>
 #include <utility>
 
-#include "io/images/image_stack.h"
 #include "io/images/mrc.h"
 #include "tilt_series/fixed_pattern/fixed_pattern.h"
 #include "tilt_series/fixed_pattern/pattern_search.h"
 #include "tilt_series/half_stacks.h"
 #include "tilt_series/image.h"
-#include "tilt_series/series_plan.h"
-#include "tomofield/options.h"
+#include "tilt_series/planned_series.h"
 
 namespace tomofield::tilt_series {
 
@@ -48,10 +46,8 @@ std::size_t decoding_memory(double raw_pixels, double bin_factor);
 /// Makes images of views from sections of a stack. Thread-safe.
 class ViewDecoder {
  public:
-  /// The stack and the plan must outlive the decoder; `mask` is the user's, with a section for
-  /// every section of the stack.
-  ViewDecoder(const io::ImageStack& stack, const SeriesPlan& plan, Contrast contrast,
-              std::optional<io::MrcReader> mask);
+  /// Opens the user's mask, if the options name one.
+  explicit ViewDecoder(PlannedSeries series);
 
   /// From now on, decode() removes this pattern. No other thread may use the decoder meanwhile.
   void set_fixed_pattern(FixedPattern pattern) { pattern_ = std::move(pattern); }
@@ -70,26 +66,23 @@ class ViewDecoder {
   DecodedView decode_half(Half half, const HalfStacks& halves, std::size_t view,
                           Frames frames) const;
 
-  /// Returns about the bytes that decode() and what is done with its result take.
-  std::size_t memory() const;
-
-  /// Returns the size of a binned image in one of the frames.
-  std::int64_t recorded_width() const;
-  std::int64_t recorded_height() const;
-  std::int64_t aligned_width() const;
-  std::int64_t aligned_height() const;
-
  private:
   MaskedImage read_and_mask(std::size_t view, PixelCensus& census) const;
   DecodedView decode_masked(MaskedImage image, std::size_t view, Frames frames) const;
   MaskedImage aligned(MaskedImage recorded, std::size_t view) const;
   MaskedImage binned(MaskedImage image) const;
 
-  const io::ImageStack& stack_;
-  const SeriesPlan& plan_;
-  Contrast contrast_;
+  PlannedSeries series_;
   std::optional<io::MrcReader> mask_;
   FixedPattern pattern_;
 };
+
+/// Returns the image of decode(frames) in the one frame in which the series is fitted.
+template <typename Decode>
+MaskedImage in_fitted_frame(const PlannedSeries& series, const Decode& decode) {
+  const bool is_aligned = series.is_resampled();
+  DecodedView view = decode(Frames{.recorded = !is_aligned, .aligned = is_aligned});
+  return std::move(is_aligned ? view.aligned : view.recorded);
+}
 
 }  // namespace tomofield::tilt_series

@@ -2,16 +2,25 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "io/images/image_stack.h"
-#include "tilt_series/half.h"
 #include "tilt_series/image.h"
 
 namespace tomofield::tilt_series {
+
+/// The two halves of a measurement: of the frames of each view, or of the tilts.
+enum class Half { kEven, kOdd };
+inline constexpr std::array kBothHalves{Half::kEven, Half::kOdd};
+
+/// The stacks of both halves of the frames.
+struct HalfPaths {
+  std::filesystem::path even, odd;
+};
 
 /// Sums over the pixels of a section that are measurements in the stack of all frames. Values count
 /// from their mean, so that the squares are variances.

@@ -10,8 +10,9 @@
 #include "base/check.h"
 #include "base/log.h"
 #include "base/plausible.h"
-#include "geometry/imod_transform.h"
-#include "io/images/own_volume.h"
+#include "geometry/raw_from_aligned.h"
+#include "io/images/mrc.h"
+#include "io/saving/scratch_memory.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/view_table.h"
 #include "tilt_series/contradictions.h"
@@ -254,6 +255,14 @@ void correct(const geometry::ViewCorrection& correction, PlannedView& planned) {
 }
 
 }  // namespace
+
+TiltSeriesOptions series_options(const SeriesFiles& files, const Options& options) {
+  TiltSeriesOptions series{files, options.views};
+  series.resample = options.fit.engine == Engine::kSlab;
+  series.starts_raw = options.run.align == Alignment::kFull;
+  series.scratch_dir = io::scratch_directory(options.run.output);
+  return series;
+}
 
 std::array<std::int64_t, 2> aligned_size(const std::filesystem::path& xf,
                                          const io::ImageStack& stack) {

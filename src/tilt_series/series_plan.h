@@ -3,15 +3,51 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "geometry/view_correction.h"
 #include "io/images/image_stack.h"
 #include "tilt_series/resampling/align_image.h"
-#include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::tilt_series {
+
+/// The files of a tilt series, how they are read, and what the program adds to that.
+struct TiltSeriesOptions : SeriesFiles, ViewOptions {
+  std::shared_ptr<const io::ImageStack> images = {};  ///< views in memory, in place of `stack`
+  bool resample = true;  ///< false: views stay as they were recorded, with their alignment beside
+  /// The views will be aligned from the direction of their tilt axis on, as files state it. Else a
+  /// stack whose stated axis is not vertical needs an alignment.
+  bool starts_raw = false;
+  /// Takes decoded views that do not fit in memory; empty: the system's folder for such files.
+  std::filesystem::path scratch_dir = {};
+  /// [section]: changes of the alignment that the files give. Empty: none. Local motion
+  /// needs `resample`.
+  std::vector<geometry::ViewCorrection> corrections = {};
+  /// Sections that are left out beside `exclude`, counted from 0, ascending.
+  std::vector<std::int64_t> left_out = {};
+};
+
+/// Returns how a tilt series is read. Views stay as they were recorded for the ray engine. Scratch
+/// files go beside the output, if there is one.
+TiltSeriesOptions series_options(const SeriesFiles& files, const Options& options);
+
+/// One view of the series.
+struct View {
+  std::int64_t section = 0;  ///< zero-based section of the stack
+  double tilt_deg = 0.0;     ///< rotation about +Y
+  double x_tilt_deg = 0.0;   ///< rotation about +X, before the tilt
+};
+
+/// The direction of the tilt axis in the images of a stack, and what states it.
+struct StatedAxis {
+  double angle_deg = 0.0;  ///< counter-clockwise from +Y, from −180 to 180
+  std::string source;      ///< for messages: "'TS_01.mdoc', line 9"
+  bool is_given = false;   ///< by the user with --tilt-axis
+};
 
 /// A view that is kept, and how its aligned image comes from its section.
 struct PlannedView {

@@ -10,7 +10,7 @@
 #include "io/images/image_stack.h"
 #include "io/tables/alignment_files.h"
 #include "tilt_series/section_table.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/series_plan.h"
 
 namespace tomofield::tilt_series {
 

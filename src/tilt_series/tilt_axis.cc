@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "io/tables/text_lines.h"
-#include "option_table/name_list.h"
+#include "option_table/values.h"
 #include "tomofield/error.h"
 
 namespace tomofield::tilt_series {

@@ -304,20 +304,16 @@ TEST(TiltSeries, ConstantViewIsNamed) {
   expect_parts(refusal(options), {"section 3", "constant", "a.st"});
 }
 
-TEST(TiltSeries, OfHeadersAloneKnowsItsGeometry) {
+TEST(PlannedSeries, KnowsItsGeometryWithoutViews) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = small_series(scratch);
   write_stack(options.stack, 16, 12, 3, [](auto, auto, auto) { return 7.0f; });
-  options.look_at_views = false;  // the views are constant, which is not seen
-  const TiltSeries series(options);
+  const PlannedSeries series(options);  // the views are constant, which is not seen
   EXPECT_EQ(series.views().size(), 3u);
   EXPECT_EQ(series.width(), 16);
-  std::vector<float> image(16 * 12);
-  std::vector<std::uint8_t> valid(16 * 12);
-  series.read_view(1, image, valid);
-  EXPECT_EQ(valid[100], 1);
+  EXPECT_EQ(decode_view(series, 1).valid[100], 1);
   write_stack(options.stack, 16, 12, 4, [](auto, auto, auto) { return 7.0f; });
-  EXPECT_THROW(TiltSeries{options}, Error) << "of four sections and three angles";
+  EXPECT_THROW(PlannedSeries{options}, Error) << "of four sections and three angles";
 }
 
 // Transmission images I0 exp(−integral): a bright field with a dark disc.

@@ -12,10 +12,11 @@
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/field_artefacts.h"
-#include "field/sampling/middle_plane.h"
+#include "field/sampling/sample_box.h"
 #include "measurement/background.h"
 #include "measurement/patch_errors.h"
 #include "measurement/undecided_beads.h"
+#include "tune/trial_record.h"
 
 namespace tomofield::tune {
 
@@ -134,7 +135,7 @@ std::vector<FitTrial> TrialFits::run(const std::vector<TrialSettings>& batch, Tr
   processes_.run_collectively([&] {
     for (std::size_t i = 0; i < trials.size() && file && processes_.is_root(); ++i) {
       if (!trials[i] || known[i]) continue;
-      file->add(trial_json(settings_json(batch[i]), trials[i]->score, trials[i]->seconds));
+      file->add(*trials[i]);
     }
   });
   if (was_stopped) throw base::StopRequested();
@@ -170,9 +171,8 @@ TrialFits::Trials TrialFits::known_trials(const std::vector<TrialSettings>& batc
   if (!file) return trials;
   json found = json::array();
   for (const TrialSettings& settings : batch) {
-    const auto trial =
-        processes_.is_root() ? file->find(settings_json(settings)) : std::optional<json>();
-    found.push_back(trial ? *trial : json(nullptr));
+    const auto trial = processes_.is_root() ? file->find(settings) : std::nullopt;
+    found.push_back(trial ? to_json(*trial) : json(nullptr));
   }
   found = json::parse(processes_.broadcast(found.dump()));
   for (std::size_t i = 0; i < batch.size(); ++i)
@@ -248,9 +248,7 @@ void TrialFits::share(Trials& trials) const {
   for (auto& trial : trials) {
     const double owner = processes_.allreduce_max(trial ? processes_.rank() : -1);
     if (owner < 0) continue;
-    const std::string text =
-        trial ? trial_json(settings_json(trial->settings), trial->score, trial->seconds).dump()
-              : "";
+    const std::string text = trial ? to_json(*trial).dump() : "";
     Section section = trial ? std::move(trial->section) : Section();
     trial = trial_from(json::parse(processes_.broadcast(text, static_cast<int>(owner))));
     trial->section = shared_section(std::move(section), static_cast<int>(owner));

@@ -7,8 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/stop_requested.h"
-#include "base/stopwatch.h"
+#include "base/progress.h"
 #include "tune/trial_measurement.h"
 #include "tune/tuning.h"
 

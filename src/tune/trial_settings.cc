@@ -3,42 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <string>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "base/enum_names.h"
-#include "base/plausible.h"
-#include "io/json_numbers.h"
-#include "kernels/spikes.h"
-#include "tomofield/error.h"
-#include "tune/trial_file.h"
 
 namespace tomofield::tune {
 namespace {
-
-using nlohmann::json;
-
-constexpr std::int64_t kMostOfAnything = 1000000000;
-
-TrialSettings settings_from(const json& entry) {
-  const auto penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>());
-  if (!penalty) throw Error("'tv_penalty' is no penalty");
-  const auto prior = base::enum_named<Prior>(entry.at("prior").get<std::string>());
-  if (!prior) throw Error("'prior' is no prior");
-  return {.penalty = *penalty,
-          .variation = io::number_at(entry, "tv", 0, base::kLargestNumber),
-          .rank = static_cast<int>(io::integer_at(entry, "rank", 1, kMostOfAnything)),
-          .epochs = static_cast<int>(io::integer_at(entry, "epochs", 1, kMostOfAnything)),
-          .fits_view_scale = entry.at("view_scale"),
-          .background_part = io::number_at(entry, "background_part", 0, 1),
-          .masks_beads = entry.at("masks_beads"),
-          .spike_rank =
-              static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank)),
-          .prior = *prior};
-}
 
 // Says whether settings are equal. Weights may differ by rounding.
 bool are_equal(const TrialSettings& a, const TrialSettings& b) {
@@ -101,46 +74,6 @@ std::string describe(const TrialSettings& settings, const TrialSettings& usual) 
   if (settings.background_part != usual.background_part)
     text += fmt::format(", {:.0f} % of the background subtracted", 100 * settings.background_part);
   return text;
-}
-
-json settings_json(const TrialSettings& s) {
-  return {{"tv_penalty", base::name_of(s.penalty)},
-          {"tv", s.variation},
-          {"rank", s.rank},
-          {"epochs", s.epochs},
-          {"view_scale", s.fits_view_scale},
-          {"background_part", s.background_part},
-          {"masks_beads", s.masks_beads},
-          {"spike_rank", s.spike_rank},
-          {"prior", base::name_of(s.prior)}};
-}
-
-FitTrial trial_from(const json& entry) {
-  return {.settings = settings_from(entry),
-          .score = score_from(entry),
-          .seconds = entry.contains("seconds")
-                         ? io::number_at(entry, "seconds", 0, base::kLargestNumber)
-                         : 0.0};
-}
-
-json tuning_json(const TunedFit& tuned) {
-  json tuning = tuned_json(tuned, settings_json);
-  for (std::size_t i = 0; i < tuned.trials.size(); ++i) {
-    const Difference d = difference_to_chosen(tuned.trials[i], tuned);
-    tuning["trials"][i].update(
-        {{"above_chosen", d.log_ratio}, {"standard_error", d.standard_error}});
-  }
-  return tuning;
-}
-
-TunedFit tuned_from(const json& tuning) {
-  TunedFit tuned{
-      .settings = settings_from(tuning.at("chosen")), .trials = {}, .predicted_views = {}};
-  for (const double view : io::numbers_at(tuning, "predicted_views", 0, base::kLargestNumber))
-    tuned.predicted_views.push_back(static_cast<int>(view));
-  for (const json& trial : tuning.at("trials")) tuned.trials.push_back(trial_from(trial));
-  for (const json& trial : tuning.at("last_trials")) tuned.last_trials.push_back(trial_from(trial));
-  return tuned;
 }
 
 }  // namespace tomofield::tune

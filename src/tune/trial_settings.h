@@ -1,6 +1,5 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
@@ -49,15 +48,5 @@ std::optional<Difference> gain_of_prior(const TunedFit& tuned);
 /// Describes settings as in "smooth tv 5", and which corrections of the views differ from those of
 /// `usual`.
 std::string describe(const TrialSettings& settings, const TrialSettings& usual);
-
-/// Writes settings in the form that trial files and metrics have.
-nlohmann::json settings_json(const TrialSettings& settings);
-/// Reads a trial that trial_json() has written with such settings.
-FitTrial trial_from(const nlohmann::json& entry);
-/// Writes the chosen settings and all trials, each with its difference to the chosen one.
-nlohmann::json tuning_json(const TunedFit& tuned);
-/// Reads what tuning_json() has written. Throws nlohmann::json::exception or Error if it is
-/// damaged.
-TunedFit tuned_from(const nlohmann::json& tuning);
 
 }  // namespace tomofield::tune

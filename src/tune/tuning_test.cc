@@ -19,6 +19,7 @@
 #include "scratch_directory.h"
 #include "sphere_series.h"
 #include "tomofield/error.h"
+#include "tune/trial_record.h"
 
 namespace tomofield::tune {
 namespace {
@@ -139,10 +140,6 @@ class Tuning : public ::testing::Test {
     return {{Penalty::kSmooth, variation, 3, 4}, {1.5, {1.0, 2.0}}, 0.25};
   }
 
-  static nlohmann::json json_of(const FitTrial& trial) {
-    return trial_json(settings_json(trial.settings), trial.score, trial.seconds);
-  }
-
   SphereSeries series_;
   measurement::Measurement measurement_{.geometry = series_.geometry,
                                         .roi = {0, 0, SphereSeries::kWidth, SphereSeries::kRows},
@@ -171,7 +168,7 @@ TEST_F(Tuning, RepeatsNoTrialOfTheFile) {
   // A file without the last trial.
   std::filesystem::remove(file_);
   TrialFile part = open();
-  for (std::size_t i = 0; i + 1 < first->trials.size(); ++i) part.add(json_of(first->trials[i]));
+  for (std::size_t i = 0; i + 1 < first->trials.size(); ++i) part.add(first->trials[i]);
   TrialFile rest = open();
   const auto third = tuned(rest);
   EXPECT_GT(num_steps_, 0);
@@ -261,26 +258,25 @@ TEST_F(Tuning, TriesBothPenalties) {
 
 TEST_F(Tuning, FindsATrialOfTheFileByAllOfItsSettings) {
   TrialFile file = open();
-  EXPECT_FALSE(file.find(settings_json(some_trial(2).settings)).has_value());
-  file.add(json_of(some_trial(2)));
-  file.add(json_of(some_trial(4)));
+  EXPECT_FALSE(file.find(some_trial(2).settings).has_value());
+  file.add(some_trial(2));
+  file.add(some_trial(4));
   const TrialFile read = open();
-  const auto found = read.find(settings_json(some_trial(4).settings));
+  const auto found = read.find(some_trial(4).settings);
   ASSERT_TRUE(found.has_value());
-  EXPECT_EQ(score_from(*found).view_error, some_trial(4).score.view_error);
-  EXPECT_EQ(found->at("seconds"), 0.25);
+  EXPECT_EQ(found->score.view_error, some_trial(4).score.view_error);
+  EXPECT_EQ(found->seconds, 0.25);
   for (const TrialSettings& other :
        {TrialSettings{Penalty::kConcave, 4, 3, 4}, TrialSettings{Penalty::kSmooth, 5, 3, 4},
         TrialSettings{Penalty::kSmooth, 4, 2, 4}, TrialSettings{Penalty::kSmooth, 4, 3, 5}})
-    EXPECT_FALSE(read.find(settings_json(other)).has_value());
+    EXPECT_FALSE(read.find(other).has_value());
   const TrialFile fresh(file_, "{}", false);
-  EXPECT_FALSE(fresh.find(settings_json(some_trial(4).settings)).has_value())
-      << "trials were not to be reused";
+  EXPECT_FALSE(fresh.find(some_trial(4).settings).has_value()) << "trials were not to be reused";
 }
 
 TEST_F(Tuning, RefusesTrialsOfAnotherSeriesAndDamagedFiles) {
   TrialFile file = open();
-  file.add(json_of(some_trial(2)));
+  file.add(some_trial(2));
   const std::string other = message_of<Error>([&] { open("{1}"); });
   EXPECT_NE(other.find(file_.string()), std::string::npos) << other;
   EXPECT_NE(other.find("--overwrite"), std::string::npos) << other;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -60,8 +59,6 @@ struct Verdict {
   double peak_GiB = 0.0;  ///< of the process that used most
   std::vector<Warning> warnings;
 };
-
-nlohmann::json verdict_json(const Verdict& verdict);
 
 /// Returns the line that says how a run went.
 std::string verdict_line(const Verdict& verdict);

@@ -9,7 +9,7 @@
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/image_pair.h"
-#include "geometry/tilt_order.h"
+#include "geometry/tilt_geometry.h"
 #include "verdict/likeness_order.h"
 
 namespace tomofield::verdict {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "base/stop_requested.h"
+#include "base/progress.h"
 #include "io/hdf5/hdf5_reader.h"
 
 namespace tomofield::view {

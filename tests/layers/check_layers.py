@@ -8,7 +8,9 @@ public headers ("tomofield/..."); sub-folders count as their room. A line names 
 of its room includes. Unit tests may include any room above theirs in src/layers.txt, and helpers of
 tests/. Public headers include each other and the standard library only. docs/architecture.md has the
 drawing of the graph. No folder of src/ has more files or lines, without its unit tests, than LIMITS
-and OTHER_LIMITS say. Prints every offence as FILE:LINE and exits with status 1 if there is one, 2
+and OTHER_LIMITS say. Few modules are small: a module is a header with the sources that include it
+first, as those of backends do. The endings of the names of a run's files stand in
+src/output/output_paths.cc alone. Prints every offence as FILE:LINE and exits with status 1 if there is one, 2
 where it cannot check.
 """
 import pathlib
@@ -19,6 +21,11 @@ from rooms import BadGraph, read_rooms, with_drawing
 
 LIMITS = 40, 5000  # files and lines of a folder
 OTHER_LIMITS = {"reconstruct": (18, 1900)}  # the run alone
+
+SMALL_MODULE, MOST_SMALL = 60, 0.05  # lines, and the part of the modules that may have fewer
+MANY_MODULES = 100  # a smaller project may have any
+RESULT_NAMES = pathlib.Path("output", "output_paths.cc")
+RESULT_NAME = re.compile(r'"(_\w+\.\w+)"')
 
 SOURCES = {".h", ".cc", ".cu", ".cuh"}
 QUOTED_INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"')
@@ -100,6 +107,39 @@ def offences_in_size(src):
             yield folder, 1, f"{num_lines} lines in a folder are more than {most_lines}: divide it"
 
 
+def module_of(path, src):
+    """Returns the header of a module, without extension, relative to src/."""
+    own = path.with_suffix(".h")
+    if path.suffix == ".h" or own.is_file():
+        return str(own.relative_to(src).with_suffix(""))
+    first = next((included for _, included in includes(path, QUOTED_INCLUDE)), None)
+    return str(pathlib.Path(first or path.relative_to(src)).with_suffix(""))
+
+
+def offences_in_modules(src):
+    lines = {}
+    for path in source_files(src):
+        if not is_test(path):
+            module = module_of(path, src)
+            num_lines = len(path.read_text(encoding="utf-8").splitlines())
+            lines[module] = lines.get(module, 0) + num_lines
+    small = sorted(module for module, num in lines.items() if num < SMALL_MODULE)
+    if len(lines) >= MANY_MODULES and len(small) > MOST_SMALL * len(lines):
+        yield (src, 1, f"{len(small)} of {len(lines)} modules have fewer than {SMALL_MODULE} lines: "
+                       f"join some of {', '.join(small)} with those that use them")
+
+
+def offences_in_result_names(src):
+    home = src / RESULT_NAMES
+    names = set(RESULT_NAME.findall(home.read_text(encoding="utf-8"))) if home.is_file() else set()
+    for path in source_files(src):
+        if path == home or is_test(path):
+            continue
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+            for name in names.intersection(RESULT_NAME.findall(line)):
+                yield path, number, f"'{name}' is a name of a run's file: take it from {RESULT_NAMES}"
+
+
 def offences_in_public_headers(include):
     for path in source_files(include):
         for number, included in includes(path, ANY_INCLUDE):
@@ -134,7 +174,8 @@ def main():
         print(f"{src / 'layers.txt'}:{fault}", file=sys.stderr)
         return 2
     offences = [*offences_in_src(src, project / "tests", rooms), *stale_entries(src, rooms),
-                *offences_in_size(src),
+                *offences_in_size(src), *offences_in_modules(src),
+                *offences_in_result_names(src),
                 *offences_in_public_headers(project / "include"),
                 *offences_in_drawing(project / "docs" / "architecture.md", rooms)]
     for path, number, what in offences:

@@ -79,6 +79,31 @@ def test_catches_a_room_without_files():
     assert "'cli' has no source file" in output, output
 
 
+def test_few_modules_are_small():
+    def modules(num_small, backend=""):
+        rooms = ["a", "b", "c", "d"]
+        layers = "".join(f"{room}:\n" for room in rooms)
+        files = {f"src/{rooms[i % 4]}/m{i}.h": "\n" * (20 if i < num_small else 70) for i in range(100)}
+        files.update({f"src/a/m{4 * i}_fast.cc": backend for i in range(2) if backend})
+        page = with_drawing(MARKS, graph_of(layers))
+        return run_checker(files, layers, page)
+    assert modules(5)[0] == 0, modules(5)[1]
+    status, output = modules(6)
+    assert status == 1 and "6 of 100 modules" in output and "b/m5" in output, output
+    of_first = '#include "a/m0.h"\n' + "\n" * 50
+    assert modules(6, of_first)[0] == 0, "a source without a header belongs to what it includes first"
+
+
+def test_names_of_results_have_one_home():
+    home = {**FILES, "src/io/output_paths.cc": "", "src/output/output_paths.cc": 'with("_tree.png")'}
+    layers = LAYERS + "output:\n"
+    page = with_drawing(MARKS, graph_of(layers))
+    assert run_checker(home, layers, page)[0] == 0
+    status, output = run_checker({**home, "src/io/a.cc": '\nopen(name + "_tree.png");\n'}, layers,
+                                 page)
+    assert status == 1 and "src/io/a.cc:2: '_tree.png'" in output, output
+
+
 def test_folders_have_a_largest_size():
     many = {f"src/field/a{i}.h": "" for i in range(39)}  # beside all.h
     assert run_checker({**FILES, **many})[0] == 0

@@ -11,10 +11,10 @@
 #include "align/beads/bead_equations.h"
 #include "base/statistics.h"
 #include "base/trace.h"
-#include "geometry/tilt_order.h"
+#include "geometry/tilt_geometry.h"
 #include "tilt_series/tilt_series.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewCorrection;
@@ -165,8 +165,8 @@ class BeadSet {
 };
 
 // Returns by which part the squared distances of each bead fall if the others decide.
-MeanGain gain_of_others(std::span<const std::vector<BeadPoint>> beads, const BeadGeometry& geometry,
-                        const Freedoms& freedoms) {
+base::MeanGain gain_of_others(std::span<const std::vector<BeadPoint>> beads,
+                              const BeadGeometry& geometry, const Freedoms& freedoms) {
   const std::size_t turns = std::min(beads.size(), kMostTurns);
   const std::vector<ViewCorrection> none(geometry.tilt_deg.size());
   std::vector<double> gains;
@@ -182,7 +182,7 @@ MeanGain gain_of_others(std::span<const std::vector<BeadPoint>> beads, const Bea
     for (std::size_t i = 0; i < before.size(); ++i)
       if (before[i] > 0.0) gains.push_back(1.0 - after[i] / before[i]);
   }
-  return mean_gain(gains);
+  return base::mean_gain(gains);
 }
 
 // Returns where the spots are in views that are not corrected.
@@ -262,4 +262,4 @@ std::optional<BeadAlignment> align_by_beads(const JointProblem& problem,
   return found;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

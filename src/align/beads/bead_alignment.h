@@ -6,11 +6,11 @@
 
 #include "align/freedoms.h"
 #include "align/joint_alignment.h"
-#include "align/mean_gain.h"
+#include "base/statistics.h"
 #include "distributed/communicator.h"
 #include "geometry/view_correction.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// The spot of a bead in a view that is aligned with corrections, relative to its centre. All
 /// lengths here are in pixels of the fit, but for those that align_by_beads() returns.
@@ -35,7 +35,7 @@ struct BeadAlignment {
   /// count less.
   double files_px = 0.0, before_px = 0.0, after_px = 0.0;
   /// The part by which the squared distances fall, over beads that do not decide about the steps.
-  MeanGain gain;
+  base::MeanGain gain;
 };
 
 /// Finds the steps after `corrections` with which each bead keeps its place in the specimen best:
@@ -61,4 +61,4 @@ std::optional<BeadAlignment> align_by_beads(
     const JointProblem& problem, const std::vector<geometry::ViewCorrection>& corrections,
     const Freedoms& freedoms, const distributed::Communicator& processes);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -11,7 +11,7 @@
 #include "base/random.h"
 #include "geometry/tilt_geometry.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewCorrection;
@@ -188,4 +188,4 @@ TEST(BeadAlignment, NeedsThreeBeads) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -6,7 +6,7 @@
 
 #include <Eigen/QR>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewCorrection;
@@ -117,4 +117,4 @@ Eigen::MatrixXd BeadEquations::by_unknowns(const std::vector<BeadUnknown>& unkno
   return columns;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

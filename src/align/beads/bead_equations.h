@@ -9,7 +9,7 @@
 #include "align/beads/bead_alignment.h"
 #include "geometry/view_correction.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// An unknown: the coefficient of a mode, which is a function of the view, in a quantity that may
 /// change.
@@ -61,4 +61,4 @@ class BeadEquations {
   Eigen::VectorXd weights_;  // of the squared distances
 };
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

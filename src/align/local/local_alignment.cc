@@ -15,9 +15,9 @@
 #include "base/trace.h"
 #include "fit/fit.h"
 #include "fit/stages.h"
-#include "geometry/tilt_order.h"
+#include "geometry/tilt_geometry.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewCorrection;
@@ -150,4 +150,4 @@ LocalAlignment align_locally(const JointProblem& problem, const Freedoms& freedo
   return LocalFit(problem, freedoms, std::move(start), processes).run();
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

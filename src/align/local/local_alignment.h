@@ -7,7 +7,7 @@
 #include "distributed/communicator.h"
 #include "geometry/view_correction.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// The result of a local alignment: motion that the given corrections lack.
 struct LocalAlignment {
@@ -28,4 +28,4 @@ LocalAlignment align_locally(const JointProblem& problem, const Freedoms& freedo
                              std::span<const geometry::ViewWarp> motion,
                              const distributed::Communicator& processes);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

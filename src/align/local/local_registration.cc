@@ -5,9 +5,9 @@
 
 #include <Eigen/Cholesky>
 
-#include "align/mean_gain.h"
+#include "base/statistics.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr double kFewestSamples = 20;  // fewer do not tell scale, trend and an affine motion
@@ -138,9 +138,9 @@ std::vector<ViewWarp> motion_that_pays(std::span<const LocalRegistration> views)
   std::vector<double> gains;
   for (const LocalRegistration& view : views) gains.push_back(view.gain());
   std::vector<ViewWarp> motion;
-  if (!mean_gain(gains).exceeds(kSure)) return motion;
+  if (!base::mean_gain(gains).exceeds(kSure)) return motion;
   for (const LocalRegistration& view : views) motion.push_back(view.solve({}));
   return motion;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

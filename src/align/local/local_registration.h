@@ -9,7 +9,7 @@
 
 #include "geometry/view_warp.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Lengths and weights of the registration of local motion.
 struct LocalRegistrationOptions {
@@ -83,4 +83,4 @@ class LocalRegistration {
 /// smaller by more than three standard errors, else nothing.
 std::vector<geometry::ViewWarp> motion_that_pays(std::span<const LocalRegistration> views);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

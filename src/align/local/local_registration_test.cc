@@ -9,7 +9,7 @@
 #include "base/random.h"
 #include "gaussian_scene.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewWarp;
@@ -118,4 +118,4 @@ TEST(LocalRegistration, AViewWithoutPixelsHasNoMotion) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

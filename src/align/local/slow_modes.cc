@@ -8,7 +8,7 @@
 
 #include "align/relaxation.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr double kAmplification = 2.0;  // is added to the factor of the slowest mode
@@ -44,4 +44,4 @@ void SlowModeAmplifier::amplify(std::span<double> steps) {
   last_added_ = std::move(added);
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

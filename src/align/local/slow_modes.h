@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Amplifies the part of the values that varies slowly from one view to the next: the first
 /// cosines of the discrete cosine transform, up to three times. `values` are in order of tilt.
@@ -26,4 +26,4 @@ class SlowModeAmplifier {
   std::vector<double> last_added_;  // the whole of it, in the last step
 };
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 // Returns a basis vector of the discrete cosine transform (DCT-II).
@@ -89,4 +89,4 @@ TEST(SlowModeAmplifier, UpdatesConvergeWhateverPartOfTheErrorIsShown) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -5,7 +5,7 @@
 #include <functional>
 #include <utility>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 std::vector<double> differences(std::vector<double> from, const std::vector<double>& less) {
@@ -24,19 +24,19 @@ const std::vector<double>& AxisLine::at(double axis_deg) {
   return place->second;
 }
 
-MeanGain AxisLine::slope(double axis_deg, double step_deg) {
-  return mean_gain(differences(at(axis_deg + step_deg), at(axis_deg - step_deg)));
+base::MeanGain AxisLine::slope(double axis_deg, double step_deg) {
+  return base::mean_gain(differences(at(axis_deg + step_deg), at(axis_deg - step_deg)));
 }
 
 bool AxisLine::leans(double axis_deg, double step_deg) {
-  const MeanGain rise = slope(axis_deg, step_deg);
+  const base::MeanGain rise = slope(axis_deg, step_deg);
   return std::abs(rise.mean) > standard_errors_ * rise.error;
 }
 
 double AxisLine::downhill(double axis_deg, double step_deg) {
   if (!leans(axis_deg, step_deg)) return axis_deg;
   const double further = axis_deg - std::copysign(step_deg, slope(axis_deg, step_deg).mean);
-  return mean_gain(differences(at(axis_deg), at(further))).mean > 0.0 ? further : axis_deg;
+  return base::mean_gain(differences(at(axis_deg), at(further))).mean > 0.0 ? further : axis_deg;
 }
 
 double AxisLine::descend(double axis_deg, double step_deg, double range_deg) {
@@ -55,11 +55,11 @@ double AxisLine::lowest(double axis_deg, double step_deg, double widest_step_deg
     std::vector<double> bends;
     for (std::size_t i = 0; i < middle.size(); ++i)
       bends.push_back(left[i] - 2 * middle[i] + right[i]);
-    const MeanGain bend = mean_gain(bends);
+    const base::MeanGain bend = base::mean_gain(bends);
     if (bend.exceeds(standard_errors_))
       return axis_deg - step * std::clamp(0.5 * slope(axis_deg, step).mean / bend.mean, -1.0, 1.0);
   }
   return axis_deg;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -4,9 +4,9 @@
 #include <map>
 #include <vector>
 
-#include "align/mean_gain.h"
+#include "base/statistics.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Looks along a line of rotations that all views share for the smallest residual. Each residual is
 /// found once.
@@ -33,11 +33,11 @@ class AxisLine {
 
  private:
   const std::vector<double>& at(double axis_deg);
-  MeanGain slope(double axis_deg, double step_deg);
+  base::MeanGain slope(double axis_deg, double step_deg);
 
   Residuals residuals_;
   double standard_errors_;
   std::map<double, std::vector<double>> known_;
 };
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

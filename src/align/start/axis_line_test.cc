@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 // Returns the residuals of two views that are alike but for a constant.
@@ -94,4 +94,4 @@ TEST(AxisLine, TakesAWiderParabolaIfTheViewsDisagreeAboutTheBendOfANarrowOne) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

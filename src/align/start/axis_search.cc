@@ -11,11 +11,10 @@
 #include "align/start/axis_line.h"
 #include "base/log.h"
 #include "base/progress.h"
-#include "base/stopwatch.h"
 #include "base/trace.h"
 #include "fit/fit.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr double kRadian_deg = 180.0 / std::numbers::pi;
@@ -116,4 +115,4 @@ std::vector<geometry::ViewCorrection> with_refined_axis(
   return turned(start, axis_deg);
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

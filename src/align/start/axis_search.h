@@ -6,7 +6,7 @@
 #include "distributed/communicator.h"
 #include "geometry/view_correction.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Number of fits that with_best_axis() makes, at most.
 inline constexpr int kMostAxisFits = 10;
@@ -46,4 +46,4 @@ std::vector<geometry::ViewCorrection> with_refined_axis(
     const JointProblem& problem, const std::vector<geometry::ViewCorrection>& start,
     const distributed::Communicator& processes);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "base/stop_requested.h"
+#include "base/progress.h"
 #include "shifted_series.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using geometry::ViewCorrection;
@@ -74,4 +74,4 @@ TEST(RefinedAxis, TellsItsProgressAndStops) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -17,7 +17,7 @@
 #include "base/threads/parallel.h"
 #include "fourier/image_transform.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using fourier::cycles_per_pixel;
@@ -254,4 +254,4 @@ CorrelationStart correlate_views(std::span<const CoarseView> views,
   return search.result();
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -6,7 +6,7 @@
 
 #include "tilt_series/image.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// A view for a coarse search: line integrals in any unit, and which pixels count.
 struct CoarseView {
@@ -42,4 +42,4 @@ struct CorrelationStart {
 CorrelationStart correlate_views(std::span<const CoarseView> views,
                                  const CorrelationOptions& options);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

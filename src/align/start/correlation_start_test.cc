@@ -10,7 +10,7 @@
 #include "base/random.h"
 #include "base/threads/parallel.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using Shift = std::array<double, 2>;
@@ -148,4 +148,4 @@ TEST(CorrelationStartThreads, SameBitsForAnyNumber) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -9,10 +9,10 @@
 
 #include "base/statistics.h"
 #include "base/threads/parallel.h"
-#include "geometry/tilt_order.h"
+#include "geometry/tilt_geometry.h"
 #include "kernels/lanes.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr double kPart = 0.3;  // of the contrast
@@ -65,4 +65,4 @@ bool exposures_differ(const measurement::Measurement& measurement,
   return !jumps.empty() && base::median(jumps) > kPart * base::median(contrasts);
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -8,7 +8,7 @@
 
 #include "sphere_series.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 // Returns what exposures_differ() says of views whose gains jump by a part of 1.
@@ -32,4 +32,4 @@ TEST(ExposuresDiffer, IfTheMeansOfViewsJump) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

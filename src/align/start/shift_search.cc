@@ -6,7 +6,7 @@
 
 #include "base/check.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using Image = ImageTransform::Image;
@@ -96,4 +96,4 @@ ShiftPeak find_shift(const ImageTransform& transform, const Reference& reference
   return peak;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -6,7 +6,7 @@
 #include "fourier/image_transform.h"
 #include "tilt_series/image.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 using fourier::ImageTransform;
 
@@ -29,4 +29,4 @@ struct Reference {
 ShiftPeak find_shift(const ImageTransform& transform, const Reference& reference,
                      const tilt_series::MaskedImage& image, const std::array<double, 2>& range_px);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <numbers>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -34,4 +34,4 @@ Eigen::MatrixXd SlabModel::correlation(double fx) const {
   return result;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

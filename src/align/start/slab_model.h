@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// The likeness of the views of a slab. A stretched view's transform at (kx, ky) is that of the
 /// specimen at (kx, ky, −kx tan θ). If the specimen is uncorrelated from place to place and fills a
@@ -24,4 +24,4 @@ class SlabModel {
   double sigma_px_;
 };
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -9,7 +9,7 @@
 #include "align/blur.h"
 #include "base/threads/parallel.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 // The values of a row of all views are factorised together, which limits their number.
@@ -211,4 +211,4 @@ std::optional<FoundPose> SlabPoseSearch::find(const SlabPose& start) const {
   return is_near && is_inside ? std::optional(found) : std::nullopt;
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

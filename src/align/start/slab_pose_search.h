@@ -8,10 +8,10 @@
 
 #include <Eigen/Core>
 
+#include "align/joint_alignment.h"
 #include "align/registration.h"
-#include "align/start/slab_pose.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// Finds how thick and how level a specimen is that fills a slab.
 ///
@@ -52,4 +52,4 @@ class SlabPoseSearch {
   std::vector<Columns> views_;
 };
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -9,7 +9,7 @@
 #include "base/random.h"
 #include "gaussian_scene.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 constexpr std::int64_t kSize = 64;
@@ -63,4 +63,4 @@ TEST(SlabPoseSearch, LowImagesTellNothing) {
 }
 
 }  // namespace
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

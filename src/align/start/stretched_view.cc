@@ -9,7 +9,7 @@
 #include "geometry/raw_from_aligned.h"
 #include "tilt_series/resampling/align_image.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 namespace {
 
 using tilt_series::MaskedImage;
@@ -77,4 +77,4 @@ MaskedImage stretched_view(const MaskedImage& image, const ViewPose& pose, doubl
   return tilt_series::align_image(image, raw_from_stretched, width, height);
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

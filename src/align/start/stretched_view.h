@@ -5,7 +5,7 @@
 
 #include "tilt_series/image.h"
 
-namespace tomofield::align {
+namespace tomofield::alignment {
 
 /// The tilt angle of a view, and where the centre of the corrected view lies in the image, relative
 /// to the centre of the image.
@@ -25,4 +25,4 @@ tilt_series::MaskedImage stretched_view(const tilt_series::MaskedImage& image, c
                                         double seen_at_deg, std::int64_t width,
                                         std::int64_t height);
 
-}  // namespace tomofield::align
+}  // namespace tomofield::alignment

@@ -7,6 +7,7 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <cstdlib>
 
 #include <algorithm>
 #include <array>
@@ -146,6 +147,11 @@ std::string reason_of_failure(const std::filesystem::path& log) {
     if (!line.empty()) last = line;
   }
   return sentence.empty() ? last : sentence;
+}
+
+std::filesystem::path program_path() {
+  if (const char* launcher = std::getenv("TOMOFIELD_LAUNCHER")) return launcher;
+  return std::filesystem::read_symlink("/proc/self/exe");
 }
 
 }  // namespace tomofield::base

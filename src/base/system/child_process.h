@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "base/stopwatch.h"
+#include "base/progress.h"
 
 namespace tomofield::base {
 
@@ -68,5 +68,9 @@ std::string reason_of_failure(int exit_status, const std::filesystem::path& log)
 /// Returns the reason why tomofield failed, from the file `log` of its output: its error message
 /// without the program's name, or the last line if there is none.
 std::string reason_of_failure(const std::filesystem::path& log);
+
+/// Returns the path by which this program can be started again. The portable archive starts it
+/// through a script, which says its own path in the variable TOMOFIELD_LAUNCHER (tools/portable).
+std::filesystem::path program_path();
 
 }  // namespace tomofield::base

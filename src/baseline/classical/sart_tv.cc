@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "baseline/classical/sirt.h"
@@ -153,11 +152,6 @@ double VariationDescent::measure_gradient() {
 
 double squared_distance(const projection::SampleGrid& grid, const float* x, const float* y) {
   return sum_of_squares(grid, [&](std::ptrdiff_t i) { return x[i] - y[i]; });
-}
-
-nlohmann::json SartTvOptions::json() const {
-  return {{"iterations", iterations}, {"subsets", subsets}, {"relaxation", relaxation},
-          {"tv_steps", tv_steps},     {"weight", weight},   {"non_negative", non_negative}};
 }
 
 Solution reconstruct_sart_tv(VoxelProblem& problem, const SartTvOptions& options, double start,

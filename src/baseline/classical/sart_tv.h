@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 
 #include "baseline/solver.h"
 #include "baseline/voxel_problem.h"
@@ -41,7 +40,6 @@ struct SartTvOptions {
   bool non_negative = true;
 
   MethodFacts facts() const { return {"sart-tv", iterations, 5, 1, 3}; }
-  nlohmann::json json() const;
 };
 
 /// Reconstructs by ordered-subset SART (Andersen and Kak 1984) with steps down the total variation

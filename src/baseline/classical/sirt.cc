@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "baseline/voxel_volume.h"
@@ -67,10 +66,6 @@ void take_step(const projection::SampleGrid& grid, const SlabPair& slabs, double
         densities[i] = std::max(lowest, densities[i] - step * inverse_columns[i] * gradient[i]);
     });
   }
-}
-
-nlohmann::json SirtOptions::json() const {
-  return {{"iterations", iterations}, {"relaxation", relaxation}, {"non_negative", non_negative}};
 }
 
 Solution reconstruct_sirt(VoxelProblem& problem, const SirtOptions& options,

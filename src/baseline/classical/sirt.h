@@ -1,6 +1,5 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <span>
 
 #include "baseline/solver.h"
@@ -35,7 +34,6 @@ struct SirtOptions {
   bool non_negative = true;
 
   MethodFacts facts() const { return {"sirt", iterations, 2, 1}; }
-  nlohmann::json json() const;
 };
 
 /// Reconstructs by weighted simultaneous iterative reconstruction (Gilbert 1972) from zero

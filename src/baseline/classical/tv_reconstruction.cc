@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
 #include "base/enum_names.h"
 #include "baseline/classical/slab_gradient.h"
 #include "kernels/lanes.h"
-#include "objective/noise_scale.h"
+#include "objective/terms.h"
 
 namespace tomofield::baseline {
 namespace {
@@ -247,14 +246,6 @@ void ChambollePock::take_step(int slab, const float* adjoint, float relaxation) 
 }
 
 }  // namespace
-
-nlohmann::json TvOptions::json() const {
-  return {{"iterations", iterations},
-          {"weight", weight.value_or(usual_weight())},
-          {"penalty", base::name_of(penalty.value_or(Penalty::kSmooth))},
-          {"concavity", concavity},
-          {"non_negative", non_negative}};
-}
 
 Solution reconstruct_tv(VoxelProblem& problem, const TvOptions& options, double start,
                         const AfterIteration& after_iteration) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 
@@ -23,7 +22,6 @@ struct TvOptions {
   /// Returns the facts of the method. Tuning may turn a penalty that is not given into the concave
   /// one, so only a smooth penalty that is given needs one volume less.
   MethodFacts facts() const { return {"tv", iterations, penalty == Penalty::kSmooth ? 5 : 6, 2}; }
-  nlohmann::json json() const;
 };
 
 /// Reconstructs by least squares with isotropic total variation:

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <numeric>
 #include <vector>
@@ -76,12 +75,6 @@ void bridge_gaps(const std::uint16_t* mask, std::int64_t width, float* rays) {
       last = x;
     }
   }
-}
-
-nlohmann::json WbpOptions::json() const {
-  return {{"window", base::name_of(filter.window)},
-          {"cutoff", filter.cutoff},
-          {"falloff", filter.falloff}};
 }
 
 Solution reconstruct_wbp(const VoxelProblem& problem, const WbpOptions& options,

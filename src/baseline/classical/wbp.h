@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <vector>
 
 #include "baseline/classical/ramp_filter.h"
@@ -24,7 +23,6 @@ struct WbpOptions {
   RampFilterOptions filter;
 
   MethodFacts facts() const { return {"wbp", 1, 1, 1}; }
-  nlohmann::json json() const;
 };
 
 /// Reconstructs by weighted back-projection (Gilbert 1972; Kak and Slaney 1988, chapter 3):

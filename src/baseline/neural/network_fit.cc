@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -182,11 +181,6 @@ void LazyAdam::step_block(std::size_t block, double learning_rate, std::span<flo
       kernels::corrected_step(usual.beta1, usual.beta2, learning_rate, ++steps_[block]);
   kernels::adam_step(step, static_cast<std::ptrdiff_t>(count), parameters.data() + first,
                      gradient.data(), m_.data() + first, v_.data() + first);
-}
-
-nlohmann::json NetworkOptions::json() const {
-  return {{"iterations", iterations},       {"hidden_layers", hidden_layers}, {"width", width},
-          {"learning_rate", learning_rate}, {"non_negative", non_negative},   {"seed", seed}};
 }
 
 MethodSize network_size(const projection::SampleGrid& grid, std::int64_t num_rows,

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <vector>
 
@@ -65,7 +64,6 @@ struct NetworkOptions {
   bool non_negative = true;     ///< softplus of the network's output, or the output itself
   std::uint64_t seed = 1;
   Activation activation = Activation::kRectifier;  ///< activation of the hidden layers
-  nlohmann::json json() const;
 };
 
 /// Returns the number of parameters of a network and the memory that its fit takes.

@@ -1,7 +1,6 @@
 #include "baseline/neural/network_methods.h"
 
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "baseline/neural/encodings.h"
 #include "baseline/neural/network_density.h"
@@ -24,15 +23,6 @@ std::unique_ptr<PointEncoding> encoding_of(const FourierNetOptions& options) {
 
 }  // namespace
 
-nlohmann::json IngpOptions::json() const {
-  nlohmann::json json = NetworkOptions::json();
-  json.update({{"levels", grid.levels},
-               {"coarsest", grid.coarsest},
-               {"finest", grid.finest},
-               {"table_bits", grid.table_bits}});
-  return json;
-}
-
 MethodSize IngpOptions::size(const projection::SampleGrid& samples, std::int64_t num_rows) const {
   return network_size(samples, num_rows, *encoding_of(*this, samples, num_rows), *this);
 }
@@ -41,13 +31,6 @@ Solution reconstruct_ingp(VoxelProblem& problem, const IngpOptions& options, dou
                           const AfterIteration& after_iteration) {
   return fit_network(problem, options, encoding_of(options, problem.grid(), problem.num_rows()),
                      mean_density, /*learns_noise=*/false, after_iteration);
-}
-
-nlohmann::json FourierNetOptions::json() const {
-  nlohmann::json json = NetworkOptions::json();
-  json["features"] = features;
-  json["shortest"] = shortest;
-  return json;
 }
 
 MethodSize FourierNetOptions::size(const projection::SampleGrid& samples,

@@ -16,7 +16,6 @@ struct IngpOptions : NetworkOptions {
             .detectors = 1,
             .memory_advice = "; or fewer --table-bits or --levels, or a smaller --width"};
   }
-  nlohmann::json json() const;
   MethodSize size(const projection::SampleGrid& samples, std::int64_t num_rows) const;
 };
 
@@ -42,7 +41,6 @@ struct FourierNetOptions : NetworkOptions {
             .detectors = 1,
             .memory_advice = "; or a smaller --width, or fewer --features"};
   }
-  nlohmann::json json() const;
   MethodSize size(const projection::SampleGrid& samples, std::int64_t num_rows) const;
 };
 

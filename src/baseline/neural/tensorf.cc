@@ -44,7 +44,7 @@ int one_node_size(const Rectangle& roi, int coarse_bin) {
   return static_cast<int>(std::max(kLeastSize, (side + step - 1) / step * step));
 }
 
-int one_node_size(const tilt_series::TiltSeries& series, const Options& options) {
+int one_node_size(const tilt_series::PlannedSeries& series, const Options& options) {
   return one_node_size(measurement::plan_measurement(series, options.specimen).roi,
                        options.fit.coarse_bin);
 }

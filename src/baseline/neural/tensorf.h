@@ -1,7 +1,7 @@
 #pragma once
 
 #include "geometry/tilt_geometry.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/planned_series.h"
 #include "tomofield/options.h"
 
 namespace tomofield::baseline {
@@ -17,6 +17,6 @@ Options tensorf_defaults();
 int one_node_size(const Rectangle& roi, int coarse_bin);
 
 /// Returns the side of one node for the region of a run.
-int one_node_size(const tilt_series::TiltSeries& series, const Options& options);
+int one_node_size(const tilt_series::PlannedSeries& series, const Options& options);
 
 }  // namespace tomofield::baseline

@@ -7,7 +7,7 @@
 #include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
 #include "cli/options/table_options.h"
-#include "cli/terminal/stop_signal.h"
+#include "cli/terminal/console.h"
 #include "option_table/setting.h"
 #include "options/run_options.h"
 #include "reconstruct/reconstruct.h"

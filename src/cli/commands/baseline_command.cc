@@ -13,7 +13,6 @@
 #include "cli/commands/run_reconstruction.h"
 #include "cli/commands/tensorf_command.h"
 #include "cli/options/common_options.h"
-#include "cli/options/enum_option.h"
 #include "cli/options/fit_options.h"
 #include "cli/options/help_formatter.h"
 #include "cli/options/number_checks.h"
@@ -23,8 +22,9 @@
 #include "cli/terminal/progress_bar.h"
 #include "distributed/communicator.h"
 #include "io/saving/output_set.h"
-#include "output/shared_options.h"
+#include "output/output_paths.h"
 #include "report/pictures.h"
+#include "tilt_series/series_plan.h"
 
 namespace tomofield::cli {
 namespace {
@@ -52,11 +52,19 @@ Sizes sizes_of(const baseline::BaselinePlan& plan, VolumeAxes axes) {
           axes};
 }
 
-void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts& method) {
+// Prints the plan of a baseline, before other output, in a file too. Returns the volume's sizes.
+Sizes print_plan(const baseline::BaselinePlan& plan, const baseline::BaselineOptions& options,
+                 const baseline::MethodFacts& method) {
+  const Sizes sizes = sizes_of(plan, options.shared.volume.axes);
+  print_sizes(sizes);
   print("{} voxels with the margins, {} parameters; {} on {}; about {:.2f} GiB of memory\n",
         plan.num_voxels, plan.num_parameters, count_of(method.iterations, "iteration"),
         count_of(base::thread_count(), "thread"),
         static_cast<double>(plan.memory_bytes) / (1 << 30));
+  if (options.shared.fit.tune)
+    print("short trials first, that choose settings by held-out views\n");
+  flush_output();
+  return sizes;
 }
 
 void print_summary(const baseline::BaselineSummary& summary) {
@@ -68,30 +76,29 @@ void print_summary(const baseline::BaselineSummary& summary) {
   print("\n");
 }
 
+// Checks the views and prints what a baseline would do.
+void rehearse(const baseline::BaselineOptions& options, const baseline::MethodFacts& method,
+              const DryRun& dry_run) {
+  const tilt_series::MeasuredSeries series(
+      tilt_series::series_options(options.files, options.shared));
+  const Sizes sizes = print_plan(baseline::plan_baseline(series, options), options, method);
+  if (dry_run.grid) write_grid(*dry_run.grid, sizes);
+}
+
 // Runs a baseline whose options have been checked.
 void run_method(const baseline::BaselineOptions& options, const baseline::MethodFacts& method,
-                const baseline::BaselinePaths& paths, const DryRun& dry_run) {
-  const Options& shared = options.shared;
-  tilt_series::TiltSeriesOptions input = output::series_options(options.files, shared);
-  input.keep_views = !dry_run.is_wanted;
-  const tilt_series::TiltSeries series(input);
-  const baseline::BaselinePlan plan = baseline::plan_baseline(series, options);
-  const Sizes sizes = sizes_of(plan, shared.volume.axes);
-  print_sizes(sizes);
-  print_plan(plan, method);
-  if (shared.fit.tune) print("short trials first, that choose settings by held-out views\n");
-  flush_output();  // the plan comes before other output, in a file too
-  if (dry_run.is_wanted && dry_run.grid) write_grid(*dry_run.grid, sizes);
-  if (dry_run.is_wanted) return;
+                const output::OutputPaths& paths) {
+  const tilt_series::TiltSeries series(tilt_series::series_options(options.files, options.shared));
+  print_plan(baseline::plan_baseline(series, options), options, method);
   io::OutputSet results;
   const baseline::BaselineSummary summary = baseline::run_baseline(
       series, options, {make_progress_bar("tune"), make_progress_bar("baseline")});
-  const auto pictures = report::write_run_pictures(results.location_of(paths.volume), series,
-                                                   summary.bead_masking, paths.picture_prefix);
+  report::write_run_pictures(results.location_of(paths.volume), series, summary.bead_masking,
+                             paths);
   results.commit();
   print_summary(summary);
   print("tomogram  {}\nmetrics   {}\n", paths.volume.string(), paths.json.string());
-  print_pictures(pictures);
+  print_pictures(paths.pictures());
 }
 
 template <typename Method>
@@ -103,17 +110,20 @@ void run(BaselineArguments<Method>& arguments, const Origins& origins) {
     method.non_negative = arguments.non_negative.value_or(shared.views.contrast != Contrast::kDark);
   const baseline::BaselineOptions options{arguments.choices.files, shared, method,
                                           arguments.ctf_correction};
-  std::vector<io::OutputLock> locks;
-  if (arguments.dry_run.is_wanted)
+  const output::OutputPaths paths = output::output_paths(shared.run.output);
+  const auto check_trace = [&] {
+    check_trace_file(arguments.trace, {paths.volume, paths.json}, options.files,
+                     shared.run.overwrite);
+  };
+  if (arguments.dry_run.is_wanted) {
     baseline::check_options(options);
-  else
-    locks = baseline::claim_outputs(options);
-  const baseline::BaselinePaths paths = baseline::baseline_paths(shared.run.output);
-  check_trace_file(arguments.trace, {paths.volume, paths.json}, options.files,
-                   shared.run.overwrite);
-  run_traced(arguments.dry_run.is_wanted ? std::nullopt : arguments.trace,
-             distributed::Communicator::alone(),
-             [&] { run_method(options, method.facts(), paths, arguments.dry_run); });
+    check_trace();
+    return rehearse(options, method.facts(), arguments.dry_run);
+  }
+  const std::vector<io::OutputLock> locks = baseline::claim_outputs(options);
+  check_trace();
+  run_traced(arguments.trace, distributed::Communicator::alone(),
+             [&] { run_method(options, method.facts(), paths); });
 }
 
 // Registers the options of every method.

@@ -3,8 +3,6 @@
 #include "cli/commands/run_reconstruction.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
-#include "cli/terminal/exit_status.h"
-#include "cli/terminal/stop_signal.h"
 #include "io/json.h"
 #include "reconstruct/reconstruct.h"
 

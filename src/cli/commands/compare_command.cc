@@ -9,18 +9,15 @@
 #include <vector>
 
 #include "base/log.h"
-#include "base/system/program_path.h"
+#include "base/system/child_process.h"
 #include "cli/commands/commands.h"
 #include "cli/options/common_options.h"
 #include "cli/options/config_file.h"
-#include "cli/options/given_options.h"
 #include "cli/options/help_formatter.h"
 #include "cli/options/number_checks.h"
 #include "cli/options/place_options.h"
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
-#include "cli/terminal/exit_status.h"
-#include "cli/terminal/stop_signal.h"
 #include "compare/comparison.h"
 #include "tomofield/error.h"
 

@@ -12,6 +12,7 @@
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
 #include "evaluate/artefacts.h"
+#include "evaluate/evaluation_record.h"
 #include "evaluate/matching/picks.h"
 #include "evaluate/reprojection.h"
 #include "evaluate/resolution/fsc.h"
@@ -20,8 +21,8 @@
 #include "io/json.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_set.h"
-#include "output/shared_options.h"
 #include "report/pictures.h"
+#include "tilt_series/series_plan.h"
 
 namespace tomofield::cli {
 namespace {
@@ -124,9 +125,9 @@ void reproject(const EvaluateArguments& arguments, Findings& findings) {
   SeriesFiles files = arguments.choices.files;
   files.stack = *arguments.series;
   const Options& chosen = arguments.choices.options;
-  const evaluate::VolumeScoreOptions options{arguments.volume,
-                                             output::series_options(files, chosen), chosen.specimen,
-                                             chosen.field.with_margin, arguments.hold_out};
+  const evaluate::VolumeScoreOptions options{
+      arguments.volume, tilt_series::series_options(files, chosen), chosen.specimen,
+      chosen.field.with_margin, arguments.hold_out};
   const evaluate::VolumeScore score = evaluate::score_volume(options);
   findings.metrics["reprojection"] = evaluate::volume_score_json(score, options);
   print("reprojection error {:.4f} of the noise's variance in {} views\n", score.errors.total,

@@ -21,7 +21,6 @@
 #include "io/saving/output_lock.h"
 #include "io/saving/output_set.h"
 #include "output/model_file.h"
-#include "output/shared_options.h"
 #include "output/volume.h"
 #include "tomofield/error.h"
 

@@ -21,9 +21,8 @@
 #include "io/saving/positioned_file.h"
 #include "io/tables/view_table.h"
 #include "output/model_file.h"
-#include "output/shared_options.h"
-#include "tilt_series/open_views.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/measured_series.h"
+#include "tilt_series/series_plan.h"
 
 namespace tomofield::cli {
 namespace {
@@ -101,7 +100,7 @@ void print_other_images(const tilt_series::TiltSeriesOptions& options) {
 }
 
 void print_series(const tilt_series::TiltSeriesOptions& options) {
-  const tilt_series::TiltSeries series(options);
+  const tilt_series::MeasuredSeries series(options);
   print("  as a tilt series {} views of {} × {} pixels of {:.7g} Å, tilt axis along y\n",
         series.views().size(), series.width(), series.height(), series.pixel_size_A());
   if (options.contrast == Contrast::kDark) {
@@ -237,12 +236,8 @@ void add_info_command(CLI::App& program) {
   command->get_option("stack")->description(
       "An MRC file, a model (.h5), or a tilt series: a stack, raw or aligned, or a project");
   add_help_all(*command);
-  command->callback([choices] {
-    tilt_series::TiltSeriesOptions options =
-        output::series_options(choices->files, choices->options);
-    options.keep_views = false;
-    print_info(options);
-  });
+  command->callback(
+      [choices] { print_info(tilt_series::series_options(choices->files, choices->options)); });
 }
 
 }  // namespace tomofield::cli

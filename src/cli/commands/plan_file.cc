@@ -4,8 +4,8 @@
 
 #include <string>
 
+#include "base/progress.h"
 #include "base/threads/parallel.h"
-#include "base/time_text.h"
 #include "base/utf8.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
@@ -13,7 +13,7 @@
 #include "io/saving/output_files.h"
 #include "plan/plan.h"
 #include "reconstruct/run_files.h"
-#include "tilt_series/tilt_series.h"
+#include "tilt_series/planned_series.h"
 
 namespace tomofield::cli {
 namespace {
@@ -21,7 +21,7 @@ namespace {
 constexpr double kGibibyte = 1 << 30;
 
 // Returns the memory of a run on one thread. More threads need more.
-std::size_t memory_of_one_thread(const tilt_series::TiltSeries& series,
+std::size_t memory_of_one_thread(const tilt_series::PlannedSeries& series,
                                  const options::ReconstructOptions& options,
                                  const distributed::Communicator& processes) {
   const int threads = base::thread_count();
@@ -65,9 +65,7 @@ void check_answer_file(const std::optional<std::filesystem::path>& file, const c
 void write_plan(const std::filesystem::path& file, const options::ReconstructOptions& options,
                 const distributed::Communicator& processes) {
   processes.run_collectively([&] { reconstruction::check_options(options); });
-  tilt_series::TiltSeriesOptions input = options.input();
-  input.look_at_views = false;
-  const tilt_series::TiltSeries series(input, processes);
+  const tilt_series::PlannedSeries series(options.input(), processes);
   processes.run_collectively([&] {
     const plan::RunPlan plan = plan::plan_run(series, options, processes);
     require_few_vertices(plan);

@@ -8,7 +8,6 @@
 
 #include "cli/commands/commands.h"
 #include "cli/options/common_options.h"
-#include "cli/options/enum_option.h"
 #include "cli/options/number_checks.h"
 #include "cli/terminal/console.h"
 #include "simulate/simulate_series.h"

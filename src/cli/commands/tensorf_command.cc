@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "base/check.h"
-#include "base/log_pause.h"
 #include "baseline/neural/tensorf.h"
 #include "cli/commands/run_reconstruction.h"
 #include "cli/options/common_options.h"
@@ -38,10 +37,7 @@ void add_method_options(CLI::App& command, TensorfArguments& arguments) {
 
 // Returns the side of the one node, which the headers of the series decide.
 int size_of_node(const options::ReconstructOptions& options) {
-  const base::LogPause pause;  // the run says it
-  tilt_series::TiltSeriesOptions headers = options.input();
-  headers.look_at_views = false;
-  return baseline::one_node_size(tilt_series::TiltSeries(headers), options);
+  return baseline::one_node_size(tilt_series::PlannedSeries(options.input()), options);
 }
 
 void run(TensorfArguments& arguments, const std::vector<Setting>& origins) {

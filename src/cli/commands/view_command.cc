@@ -7,7 +7,6 @@
 #include "cli/options/common_options.h"
 #include "cli/options/number_checks.h"
 #include "cli/terminal/console.h"
-#include "cli/terminal/stop_signal.h"
 #include "view/server.h"
 #include "view/viewed_volume.h"
 

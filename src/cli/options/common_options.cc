@@ -1,5 +1,8 @@
 #include "cli/options/common_options.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <algorithm>
 #include <string>
 
 #include "base/threads/parallel.h"
@@ -22,6 +25,42 @@ void add_common_options(CLI::App& command) {
           "Read options from a TOML file, such as thickness = 150")
       ->type_name("FILE.toml")
       ->group(group);
+}
+
+std::vector<option_table::GivenOption> given_options(const CLI::App& command,
+                                                     const std::vector<std::string>& except) {
+  std::vector<option_table::GivenOption> given;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->count() == 0 || std::ranges::count(except, option->get_name()) > 0) continue;
+    option_table::GivenOption& added = given.emplace_back();
+    if (!option->get_positional() || !option->get_lnames().empty()) added.flag = option->get_name();
+    if (option->get_items_expected_max() > 0)
+      added.value = fmt::format("{}", fmt::join(option->results(), ","));
+  }
+  return given;
+}
+
+const CLI::App* find_command(const CLI::App& program, const std::vector<std::string>& arguments) {
+  const CLI::App* command = &program;
+  for (const std::string& word : arguments) {
+    const auto named =
+        command->get_subcommands([&](const CLI::App* sub) { return sub->get_name() == word; });
+    if (named.empty()) break;
+    command = named.front();
+  }
+  return command;
+}
+
+std::string full_name(const CLI::App& command) {
+  const CLI::App* parent = command.get_parent();
+  return parent == nullptr ? "tomofield" : full_name(*parent) + " " + command.get_name();
+}
+
+bool is_given(const CLI::Option& option, const std::vector<std::string>& arguments) {
+  return std::any_of(arguments.begin(), arguments.end(), [&](const std::string& argument) {
+    const std::string name = argument.substr(0, argument.find('='));
+    return name.rfind('-', 0) == 0 && option.check_name(name);
+  });
 }
 
 }  // namespace tomofield::cli

@@ -10,7 +10,7 @@
 #include <optional>
 #include <utility>
 
-#include "cli/options/command_line.h"
+#include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
 #include "io/saving/output_files.h"
 #include "io/tables/text_lines.h"

@@ -11,6 +11,7 @@
 #include "cli/options/place_options.h"
 #include "cli/options/table_options.h"
 #include "io/saving/output_files.h"
+#include "output/output_paths.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
@@ -159,7 +160,7 @@ std::vector<io::OutputLock> EvaluateArguments::claim_outputs() const {
   base::require_no_faults(option_table::range_faults(series_options));
   std::vector<std::filesystem::path> inputs = io::input_files(choices.files), outputs;
   inputs.push_back(volume);
-  if (!model) inputs.push_back(std::filesystem::path(volume).replace_extension(".h5"));
+  if (!model) inputs.push_back(output::output_paths(volume).model);
   for (const auto& file : {truth, fsc_with, fsc_mask, membranes, particles, series, model})
     if (file) inputs.push_back(*file);
   for (const auto& file : {json, fsc_csv, fsc_picture, profile_csv})

@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "base/log.h"
-#include "cli/options/command_line.h"
+#include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
 #include "io/saving/output_files.h"
-#include "option_table/name_list.h"
+#include "option_table/values.h"
 #include "projects/project.h"
 #include "tomofield/error.h"
 

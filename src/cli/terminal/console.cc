@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <cstring>
 
+#include "io/saving/scratch_memory.h"
+
 namespace tomofield::cli {
 namespace {
 
@@ -17,7 +19,22 @@ void remember_failure(bool has_failed) {
   if (has_failed && g_output_error == 0) g_output_error = errno;
 }
 
+volatile std::sig_atomic_t g_signal = 0;
+void remember_signal(int signal) { g_signal = signal; }
+
+void end_program(int signal) {
+  const std::string_view line = io::scratch_fault();
+  if (line.empty()) {  // another cause: the access is tried again, and ends the program
+    std::signal(signal, SIG_DFL);
+    return;
+  }
+  (void)!::write(STDERR_FILENO, line.data(), line.size());
+  ::_exit(2);
+}
+
 }  // namespace
+
+void tell_scratch_faults() { std::signal(SIGBUS, end_program); }
 
 void open_console() {
   std::signal(SIGPIPE, SIG_IGN);
@@ -48,5 +65,15 @@ void say_text(std::string_view text) {
   std::fflush(stderr);
   std::clearerr(stderr);
 }
+
+void stop_on_signals(bool is_job) {
+  std::signal(SIGINT, remember_signal);
+  std::signal(SIGTERM, remember_signal);
+  if (is_job) std::signal(SIGUSR1, remember_signal);
+}
+
+bool stop_was_requested() { return g_signal != 0; }
+
+int stop_status() { return 128 + (g_signal != 0 ? g_signal : SIGTERM); }
 
 }  // namespace tomofield::cli

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -14,6 +15,10 @@ namespace tomofield::cli {
 /// run gets their number. Lets a write to a pipe that nobody reads, or beyond the limit of a file's
 /// size (ulimit -f), fail instead of ending the program.
 void open_console();
+
+/// Lets a disk that loses a scratch file while it is used (SIGBUS) end the program with a sentence
+/// and status 2, as other faults of the disk do.
+void tell_scratch_faults();
 
 /// Returns an argument of a message as it is shown: a text, which may be the name or the content of
 /// a file, does not control the terminal (base/utf8.h).
@@ -45,5 +50,28 @@ template <typename... Args>
 void say(fmt::format_string<Args...> format, Args&&... args) {
   say_text(fmt::format(fmt::runtime(format), shown(args)...));
 }
+
+/// Ends the program with a message and a status of its own. A run that a signal stopped is neither
+/// a success nor a fault.
+class ExitStatus : public std::runtime_error {
+ public:
+  ExitStatus(int status, const std::string& message)
+      : std::runtime_error(message), status_(status) {}
+  int status() const { return status_; }
+
+ private:
+  int status_;
+};
+
+/// Lets Ctrl-C (SIGINT) and SIGTERM ask the program to stop instead of ending it. In a job of
+/// several processes SIGUSR1 asks for it too, because mpirun passes it on without a time limit.
+void stop_on_signals(bool is_job = false);
+
+/// Returns true if one of these signals has come.
+bool stop_was_requested();
+
+/// Returns the exit status of a stopped run: 128 plus the signal. If this process got no signal,
+/// another process of the job did, and SIGTERM's status is returned.
+int stop_status();
 
 }  // namespace tomofield::cli

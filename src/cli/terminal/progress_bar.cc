@@ -1,5 +1,5 @@
 #include "cli/terminal/progress_bar.h"
-#include "base/time_text.h"
+#include "base/progress.h"
 #include "cli/terminal/console.h"
 
 #include <fmt/format.h>

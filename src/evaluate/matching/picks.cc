@@ -152,13 +152,4 @@ PickScore pick_score(const base::Volume& volume, const ParticleReference& partic
   return score;
 }
 
-nlohmann::json picks_json(const std::vector<PickScore>& scores, const std::filesystem::path& list) {
-  nlohmann::json json{{"particles", base::utf8_text(list.string())}};
-  for (const PickScore& score : scores)
-    json["kinds"][score.kind] = {{"particles", score.num_particles},
-                                 {"radius_A", score.radius_A},
-                                 {"average_precision", score.average_precision}};
-  return json;
-}
-
 }  // namespace tomofield::evaluate

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -36,7 +35,5 @@ struct PickScore {
 /// radius is that of a sphere outside of which the reference stays below a tenth of its largest
 /// voxel. High is dense. Throws Error if the reference has other voxels than the volume.
 PickScore pick_score(const base::Volume& volume, const ParticleReference& particle);
-
-nlohmann::json picks_json(const std::vector<PickScore>& scores, const std::filesystem::path& list);
 
 }  // namespace tomofield::evaluate

@@ -220,20 +220,6 @@ base::Volume read_mask(const std::filesystem::path& path, const std::filesystem:
   return read_box(mask, box);
 }
 
-nlohmann::json number_json(const std::optional<double>& number) {
-  return number ? nlohmann::json(*number) : nlohmann::json();
-}
-
-nlohmann::json curve_json(const Fsc& fsc, const FscCurve& curve) {
-  return {
-      {"resolution_at_0.5_A", number_json(crossing_A(fsc.frequency_per_A, curve, 0.5))},
-      {"resolution_at_0.143_A", number_json(crossing_A(fsc.frequency_per_A, curve, 0.143))},
-      {"correlation_at_100_A", number_json(correlation_at(fsc.frequency_per_A, curve, kCoarse_A))},
-      {"correlation_at_30_A", number_json(correlation_at(fsc.frequency_per_A, curve, kFine_A))},
-      {"correlation", curve.correlation},
-      {"voxels", curve.voxels}};
-}
-
 }  // namespace
 
 void transform_volume(const base::Shape3& shape, std::vector<std::complex<float>>& values) {
@@ -373,25 +359,6 @@ Fsc correlate_files(const FscFiles& files) {
   const base::Volume weights =
       files.mask ? read_mask(*files.mask, files.second, pair.box) : edge_window(pair.second.shape);
   return fourier_shell_correlation(pair.first, pair.second, weights, files.tilts);
-}
-
-nlohmann::json fsc_json(const Fsc& fsc, const FscFiles& files) {
-  nlohmann::json json = {{"first", base::utf8_text(files.first.string())},
-                         {"second", base::utf8_text(files.second.string())},
-                         {"frequency_per_A", fsc.frequency_per_A},
-                         {"all", curve_json(fsc, fsc.all)}};
-  json["mask"] =
-      files.mask ? nlohmann::json(base::utf8_text(files.mask->string())) : nlohmann::json();
-  if (files.box) {
-    json["box_first"] = files.box->begin;
-    json["box_last"] = files.box->end;
-  }
-  if (files.tilts) {
-    json["tilt_range_deg"] = {files.tilts->low_deg, files.tilts->high_deg};
-    json["measured"] = curve_json(fsc, *fsc.measured);
-    json["missing"] = curve_json(fsc, *fsc.missing);
-  }
-  return json;
 }
 
 std::string fsc_csv(const Fsc& fsc) {

@@ -3,7 +3,6 @@
 #include <complex>
 #include <cstdint>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -128,9 +127,6 @@ Fsc correlate_files(const FscFiles& files);
 /// The resolutions in Å at which fsc_json() states each curve's correlation: the size of a complex,
 /// and about the finest that a tomogram with voxels of 10 Å shows.
 inline constexpr double kCoarse_A = 100.0, kFine_A = 30.0;
-
-/// Returns the correlation as JSON. A crossing that does not exist and an empty shell are null.
-nlohmann::json fsc_json(const Fsc& fsc, const FscFiles& files);
 
 /// Returns a table with a line a shell: its frequency, its resolution, and the correlation and the
 /// number of Fourier voxels of each curve. An empty shell has an empty correlation.

@@ -15,7 +15,7 @@
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/box.h"
-#include "evaluate/map_like.h"
+#include "evaluate/uncertainty.h"
 #include "io/images/mrc.h"
 
 namespace tomofield::evaluate {

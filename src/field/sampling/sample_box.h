@@ -8,6 +8,7 @@
 
 #include "base/range.h"
 #include "field/field.h"
+#include "tomofield/options.h"
 
 namespace tomofield::field {
 
@@ -82,5 +83,8 @@ std::vector<float> gather_box(const OrientedBox& box, const BoxSource& source);
 
 /// Returns the densities at points, 0 outside the domain.
 std::vector<float> sample_points(const Field& field, std::span<const Point> points);
+
+/// Returns the densities of a region at half the thickness, one value a pixel: [y, x].
+std::vector<float> middle_plane(const Field& field, const Rectangle& region);
 
 }  // namespace tomofield::field

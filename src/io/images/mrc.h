@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -104,5 +105,12 @@ class MrcWriter {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Returns true for the header of a volume that this program has written, which is no tilt series.
+inline bool is_own_volume(const MrcHeader& header) {
+  return header.is_volume && std::ranges::any_of(header.labels, [](const std::string& label) {
+           return label.starts_with("tomofield ");
+         });
+}
 
 }  // namespace tomofield::io

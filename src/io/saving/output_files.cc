@@ -83,17 +83,4 @@ std::vector<fs::path> input_files(const SeriesFiles& input) {
   return files;
 }
 
-std::vector<fs::path> picture_files(const fs::path& prefix) {
-  std::vector<fs::path> files;
-  for (const char* picture : {"_xy.png", "_xz.png", "_yz.png", "_mask.png"})
-    files.emplace_back(prefix.string() + picture);
-  return files;
-}
-
-void check_result_files(std::vector<fs::path> results, const fs::path& picture_prefix,
-                        const SeriesFiles& input, bool may_replace, const std::string& advice) {
-  for (const fs::path& picture : picture_files(picture_prefix)) results.push_back(picture);
-  check_output_files(results, input_files(input), may_replace, advice);
-}
-
 }  // namespace tomofield::io

@@ -36,14 +36,4 @@ void require_volume_name(const std::filesystem::path& volume);
 /// Returns every file that a series is read from.
 std::vector<std::filesystem::path> input_files(const SeriesFiles& files);
 
-/// Returns the pictures of slices whose names begin with `prefix` (report/slice.h).
-std::vector<std::filesystem::path> picture_files(const std::filesystem::path& prefix);
-
-/// Checks that the results of a series can be written (check_output_files()) and that none replaces
-/// a file that the series is read from. picture_files() are results too. Throws
-/// Error, with `advice`, otherwise.
-void check_result_files(std::vector<std::filesystem::path> results,
-                        const std::filesystem::path& picture_prefix, const SeriesFiles& input,
-                        bool may_replace, const std::string& advice);
-
 }  // namespace tomofield::io

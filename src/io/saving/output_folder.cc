@@ -28,4 +28,19 @@ OutputFolder::~OutputFolder() {
   while (fs::remove(folder, error) && folder != first_made_) folder = folder.parent_path();
 }
 
+namespace fs = std::filesystem;
+
+ScratchFolder::ScratchFolder(const fs::path& folder, const char* name) : path_(folder / name) {
+  std::error_code error;
+  fs::remove_all(path_, error);
+  if (fs::create_directory(path_, error)) return;
+  throw Error(fmt::format("the folder '{}' cannot be written ({}): give another with -o",
+                          folder.string(), error.message()));
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
 }  // namespace tomofield::io

@@ -1,4 +1,4 @@
-#include "kernels/simd_target.h"
+#include "kernels/lanes.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/cpu/simd_target.cc"

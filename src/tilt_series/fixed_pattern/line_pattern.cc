@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "base/statistics.h"
-#include "tilt_series/fixed_pattern/known_mean.h"
+#include "tilt_series/fixed_pattern/line_profiles.h"
 
 namespace tomofield::tilt_series {
 namespace {

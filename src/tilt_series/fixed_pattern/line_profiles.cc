@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "base/statistics.h"
-#include "tilt_series/fixed_pattern/known_mean.h"
 
 namespace tomofield::tilt_series {
 namespace {

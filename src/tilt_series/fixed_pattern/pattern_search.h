@@ -13,7 +13,7 @@
 namespace tomofield::tilt_series {
 
 /// Looks for a fixed pattern in the views of a series, before they are aligned. Every process adds
-/// the views that it owns (view_owner.h).
+/// the views that it owns (own_views.h).
 class PatternSearch {
  public:
   static constexpr std::size_t kFewestViews = 8;

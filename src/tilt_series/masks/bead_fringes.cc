@@ -1,7 +1,7 @@
 #include "tilt_series/masks/bead_fringes.h"
 
 #include "microscope/view_filter.h"
-#include "tilt_series/masks/mask_disc.h"
+#include "tilt_series/masks/mask_metrics.h"
 
 namespace tomofield::tilt_series {
 namespace {

@@ -10,8 +10,7 @@
 #include "tilt_series/masks/bead_profile.h"
 #include "tilt_series/masks/bead_tracks.h"
 #include "tilt_series/masks/spots.h"
-#include "tilt_series/view_owner.h"
-#include "tilt_series/views_at_once.h"
+#include "tilt_series/own_views.h"
 
 namespace tomofield::tilt_series {
 namespace {

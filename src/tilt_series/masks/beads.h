@@ -8,15 +8,14 @@
 
 #include "distributed/communicator.h"
 #include "tilt_series/image.h"
-#include "tilt_series/masks/bead_spot.h"
-#include "tilt_series/masks/mask_disc.h"
+#include "tilt_series/masks/mask_metrics.h"
 
 namespace tomofield::tilt_series {
 
 /// A series to be searched: tilts and images of one size, dense parts high.
 struct BeadViews {
   std::vector<double> tilt_deg;
-  /// Returns the image of a view that this process owns (view_owner.h). Thread-safe.
+  /// Returns the image of a view that this process owns (own_views.h). Thread-safe.
   std::function<MaskedImage(std::size_t view)> read;
   std::optional<double> axis_x_px = {};  ///< x of the tilt axis; none: the middle of the view
   std::size_t at_once = 64;  ///< the largest number of views that may be in memory together

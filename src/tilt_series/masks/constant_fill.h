@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "tilt_series/image.h"
-#include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::tilt_series {
 

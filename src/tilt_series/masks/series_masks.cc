@@ -141,6 +141,11 @@ void add_fiducials(const TiltSeriesOptions& options, const SeriesPlan& plan,
 
 }  // namespace
 
+std::string describe_beads(const MaskMetrics& masks) {
+  if (masks.num_beads == 0) return "no beads";
+  return fmt::format("{} beads of {:.3g} nm", masks.num_beads, masks.bead_diameter_A / 10);
+}
+
 double largest_bead_px(double shorter_side_px) { return kLargestPart * shorter_side_px; }
 
 io::MrcReader open_mask(const std::filesystem::path& mask, const io::ImageStack& stack) {

@@ -7,8 +7,8 @@
 #include "io/images/image_stack.h"
 #include "io/images/mrc.h"
 #include "tilt_series/masks/beads.h"
+#include "tilt_series/masks/mask_metrics.h"
 #include "tilt_series/series_plan.h"
-#include "tilt_series/tilt_series.h"
 
 namespace tomofield::tilt_series {
 

@@ -6,7 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
-#include "tilt_series/masks/mask_disc.h"
+#include "tilt_series/masks/mask_metrics.h"
 
 namespace tomofield::tilt_series {
 namespace {

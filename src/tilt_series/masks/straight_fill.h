@@ -4,7 +4,7 @@
 
 #include "tilt_series/image.h"
 #include "tilt_series/masks/fill_frame.h"
-#include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::tilt_series {
 

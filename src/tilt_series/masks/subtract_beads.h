@@ -4,7 +4,7 @@
 
 #include "microscope/view_transfer.h"
 #include "tilt_series/image.h"
-#include "tilt_series/masks/mask_disc.h"
+#include "tilt_series/masks/mask_metrics.h"
 
 namespace tomofield::tilt_series {
 

@@ -5,7 +5,6 @@
 #include <cstddef>
 
 #include "base/threads/parallel.h"
-#include "tilt_series/raw_places.h"
 #include "tilt_series/resampling/band_limited_image.h"
 
 namespace tomofield::tilt_series {

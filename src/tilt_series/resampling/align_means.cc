@@ -8,7 +8,7 @@
 
 #include "base/check.h"
 #include "base/threads/parallel.h"
-#include "tilt_series/raw_places.h"
+#include "tilt_series/resampling/align_image.h"
 
 namespace tomofield::tilt_series {
 namespace {

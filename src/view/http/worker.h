@@ -9,7 +9,7 @@
 #include <thread>
 #include <type_traits>
 
-#include "base/stop_requested.h"
+#include "base/progress.h"
 #include "tomofield/error.h"
 #include "view/http/connection.h"
 

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "align/alignment.h"
+#include "align/freedoms.h"
+#include "align/joint_alignment.h"
+#include "align/trial.h"
+#include "geometry/view_correction.h"
+#include "geometry/view_warp.h"
+#include "tilt_series/planned_series.h"
+
+namespace tomofield::alignment {
+
+/// What an alignment is made from: a copy of the series has the same. Checksums are in hexadecimal.
+struct AlignmentOrigin {
+  std::int64_t num_sections = 0;                  ///< of the stack
+  std::array<std::int64_t, 2> size_px{};          ///< width and height of a section
+  std::map<std::string, std::string> files = {};  ///< checksums of small files, by their options
+  std::string header_tilts = {};                  ///< checksum of the tilts in the stack's header
+  std::string pixels = {};                        ///< checksum of the pixels of three sections
+  nlohmann::json made_with = {};                  ///< the options that decide what is found
+  bool operator==(const AlignmentOrigin&) const = default;
+};
+
+/// What an alignment found for one view: the change of the alignment that the files give, in pixels
+/// before binning.
+struct AlignedView {
+  std::int64_t section = 0;  ///< of the stack, from 0
+  double tilt_deg = 0.0;     ///< as the files state it
+  std::array<double, 2> shift_px{};
+  double rotation_deg = 0.0;
+  double log_magnification = 0.0;
+  double tilt_change_deg = 0.0;
+  std::optional<geometry::ViewWarp> local = {};  ///< local motion
+  ViewAgreement agreement = {};                  ///< with its projection
+  bool is_left_out = false;                      ///< it does not resemble the specimen
+
+  geometry::ViewCorrection correction() const;
+  bool operator==(const AlignedView&) const = default;
+};
+
+/// How far gold beads lie from their places, root mean square in x and y, in pixels before binning.
+struct BeadRecord {
+  std::int64_t num_beads = 0;
+  double files_px = 0.0;                   ///< with the alignment of the files
+  double before_px = 0.0, after_px = 0.0;  ///< with the new one, before and after beads were used
+  base::MeanGain gain = {};                ///< BeadAlignment::gain
+  bool is_accepted = false;                ///< whether the new alignment uses them
+};
+
+/// The search for local motion.
+struct LocalRecord {
+  LocalTrial trial = {};
+  std::array<double, 2> size_px{};  ///< of the views, if it was accepted
+  double rms_px = 0.0;              ///< of the motion, if it was accepted
+};
+
+/// The record of an alignment (NAME_align.json): what was found for each view, and what from.
+struct AlignmentRecord {
+  AlignmentOrigin origin = {};
+  bool is_accepted = false;  ///< else the alignment of the files is kept
+  Freedoms freedoms = {};
+  Comparison held_out = {};
+  std::vector<double> steps_px = {};  ///< JointAlignment::steps_px
+  double seconds = 0.0;
+  std::optional<FoundPose> pose = {};
+  std::optional<BeadRecord> beads = {};
+  std::optional<LocalRecord> local = {};
+  std::vector<AlignedView> views = {};  ///< in ascending order of sections
+};
+
+/// Returns the record of an alignment of `series`, which took `seconds`.
+AlignmentRecord make_record(AlignmentOrigin origin, const tilt_series::PlannedSeries& series,
+                            const Alignment& found, double seconds);
+
+/// Adds the views that were left out before the alignment was made to its record, with how they
+/// agreed in `first`, the alignment of all views of `series`.
+void add_left_out(const tilt_series::PlannedSeries& series, const Alignment& first,
+                  AlignmentRecord& record);
+
+/// Writes a record. Reads one that somebody may have changed: throws Error with what is wrong if no
+/// alignment could have written it. What is read is what was written, to the bit.
+nlohmann::json to_json(const AlignmentRecord& record);
+AlignmentRecord record_from(const nlohmann::json& json);
+
+}  // namespace tomofield::alignment

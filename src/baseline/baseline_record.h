@@ -1,0 +1,39 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "baseline/run_baseline.h"
+#include "baseline/tune.h"
+#include "measurement/held_out.h"
+#include "measurement/measurement.h"
+
+namespace tomofield::baseline {
+
+/// What is recorded of a finished run.
+struct BaselineRecord {
+  const BaselineOptions& options;  ///< with the method that trials chose
+  const measurement::Measurement& series;
+  const VoxelProblem& problem;
+  const Solution& solution;
+  std::size_t num_parameters;
+  double seconds;                                          ///< of the solution
+  const std::optional<Tuned>& tuned;                       ///< none without trials
+  const std::optional<measurement::ViewErrors>& held_out;  ///< none if no views are held out
+};
+
+/// Writes the record of a run, the JSON file beside the volume.
+void write_record(const std::filesystem::path& file, const BaselineRecord& record);
+
+/// Returns the name and every option of a method.
+nlohmann::json json_of(const Method& method);
+
+/// Returns the settings that a tuning may change, as the command line writes them.
+std::string settings_text(const Method& method);
+
+/// Returns the options of a run as its files have them.
+nlohmann::json options_json(const BaselineOptions& options);
+
+}  // namespace tomofield::baseline

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+
+#include "align/alignment_record.h"
+#include "options/run_options.h"
+
+namespace tomofield::realign {
+
+/// Returns what an alignment is made from: the options that decide what it finds, the sections and
+/// their size, and checksums of the small files and of the pixels of three views. Throws Error if a
+/// file cannot be read.
+alignment::AlignmentOrigin alignment_origin(const options::ReconstructOptions& options);
+
+/// Reads the record that a run resumes from. Throws Error if it is damaged, or made from something
+/// else than `origin`.
+alignment::AlignmentRecord read_alignment_record(const std::filesystem::path& path,
+                                                 const alignment::AlignmentOrigin& origin);
+
+/// Puts the corrections of a record, and the record itself, into the options of the run.
+void apply_alignment(const alignment::AlignmentRecord& record,
+                     options::ReconstructOptions& options);
+
+}  // namespace tomofield::realign
