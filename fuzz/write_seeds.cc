@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "alignment_seed.h"
+#include "align/alignment_record.h"
 #include "base/threads/parallel.h"
 #include "checkpoint/checkpoint.h"
 #include "checkpoint/tile_record.h"
@@ -210,16 +210,21 @@ void write_trials(const fs::path& folder, const fs::path& batch) {
   write(folder / "tuning", tuning_json(tuned).dump());
 }
 
-// Writes records of an alignment: plain, and with beads, a pose and local motion.
+// Writes two records of an alignment: a plain one, and one with beads, a pose and local motion.
 void write_alignments(const fs::path& folder) {
   using namespace alignment;
-  const Comparison held_out{.before = 0.5, .after = 0.4, .gain = {.mean = 0.1, .error = 0.01}};
-  AlignmentRecord record{.origin = fuzz::alignment_origin(),
-                         .is_accepted = true,
-                         .freedoms = {.rotation = true, .magnification = true, .tilt = true},
-                         .held_out = held_out,
-                         .steps_px = {1.0, 0.1},
-                         .seconds = 1.5};
+  AlignmentRecord record{
+      .origin = {.num_sections = 3,
+                 .size_px = {kWidth, kHeight},
+                 .files = {{"tlt", "00ff"}},
+                 .header_tilts = "01",
+                 .pixels = "02",
+                 .made_with = {{"seed", 1}}},
+      .is_accepted = true,
+      .freedoms = {.rotation = true, .magnification = true, .tilt = true},
+      .held_out = {.before = 0.5, .after = 0.4, .gain = {.mean = 0.1, .error = 0.01}},
+      .steps_px = {1.0, 0.1},
+      .seconds = 1.5};
   for (int section = 0; section < 3; ++section)
     record.views.push_back({.section = section,
                             .tilt_deg = 20.0 * section - 20,
@@ -230,19 +235,15 @@ void write_alignments(const fs::path& folder) {
                             .agreement = {.correlation = 0.9, .error_px = {0.1, 0.2}},
                             .is_left_out = section == 1});
   write(folder / "plain", to_json(record).dump());
-  record.pose = {.pose = {.thickness_px = 20, .pitch_deg = 1, .x_tilt_deg = 0.5},
-                 .error = {.thickness_px = 2, .pitch_deg = 0.1, .x_tilt_deg = 0.1}};
-  record.beads = {.num_beads = 5,
-                  .files_px = 2,
-                  .before_px = 2,
-                  .after_px = 0.3,
-                  .gain = held_out.gain,
-                  .is_accepted = true};
-  record.local = {.trial = {.held_out = held_out, .steps_px = {0.1}, .is_accepted = true},
-                  .size_px = {24, 20},
+  record.pose = FoundPose{.pose = {.thickness_px = 20, .pitch_deg = 1},
+                          .error = {.thickness_px = 2, .pitch_deg = 0.1}};
+  record.beads = BeadRecord{5, 2.0, 2.0, 0.3, {.mean = 0.1, .error = 0.01}, true};
+  record.local =
+      LocalRecord{.trial = {.held_out = record.held_out, .steps_px = {0.1}, .is_accepted = true},
+                  .size_px = {kWidth, kHeight},
                   .rms_px = 0.2};
   for (AlignedView& view : record.views)
-    view.local = geometry::ViewWarp{.width_px = 24, .height_px = 20};
+    view.local = geometry::ViewWarp{.width_px = kWidth, .height_px = kHeight};
   write(folder / "whole", to_json(record).dump());
 }
 

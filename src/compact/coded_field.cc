@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "base/check.h"
-#include "base/checked_size.h"
+#include "base/plausible.h"
 #include "field/tree/quadtree_bands.h"
 
 namespace tomofield::compact {

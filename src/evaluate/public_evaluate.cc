@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "base/checked_size.h"
+#include "base/plausible.h"
 #include "evaluate/resolution/fsc.h"
 #include "evaluate/similarity.h"
 #include "tomofield/error.h"

@@ -34,6 +34,8 @@ void end_program(int signal) {
 
 }  // namespace
 
+void tell_scratch_faults() { std::signal(SIGBUS, end_program); }
+
 void open_console() {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
@@ -73,7 +75,5 @@ void stop_on_signals(bool is_job) {
 bool stop_was_requested() { return g_signal != 0; }
 
 int stop_status() { return 128 + (g_signal != 0 ? g_signal : SIGTERM); }
-
-void tell_scratch_faults() { std::signal(SIGBUS, end_program); }
 
 }  // namespace tomofield::cli

@@ -16,6 +16,10 @@ namespace tomofield::cli {
 /// size (ulimit -f), fail instead of ending the program.
 void open_console();
 
+/// Lets a disk that loses a scratch file while it is used (SIGBUS) end the program with a sentence
+/// and status 2, as other faults of the disk do.
+void tell_scratch_faults();
+
 /// Returns an argument of a message as it is shown: a text, which may be the name or the content of
 /// a file, does not control the terminal (base/utf8.h).
 template <typename T>
@@ -69,9 +73,5 @@ bool stop_was_requested();
 /// Returns the exit status of a stopped run: 128 plus the signal. If this process got no signal,
 /// another process of the job did, and SIGTERM's status is returned.
 int stop_status();
-
-/// Lets a disk that loses a scratch file while it is used (SIGBUS) end the program with a sentence
-/// and status 2, as other faults of the disk do.
-void tell_scratch_faults();
 
 }  // namespace tomofield::cli

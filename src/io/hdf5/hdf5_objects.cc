@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "base/checked_size.h"
+#include "base/plausible.h"
 #include "io/hdf5/lookup3.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "base/checked_size.h"
+#include "base/plausible.h"
 #include "io/images/tiff_stack.h"
 #include "io/images/view_images.h"
 #include "io/tables/mdoc_images.h"

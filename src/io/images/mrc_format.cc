@@ -11,7 +11,6 @@
 #include <type_traits>
 
 #include "base/check.h"
-#include "base/checked_size.h"
 #include "base/plausible.h"
 #include "tomofield/error.h"
 

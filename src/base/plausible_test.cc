@@ -1,4 +1,4 @@
-#include "base/checked_size.h"
+#include "base/plausible.h"
 
 #include <gtest/gtest.h>
 
@@ -6,11 +6,28 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <type_traits>
 
 namespace tomofield::base {
 namespace {
 
 constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
+
+TEST(Interval, LetsFiniteNumbersThrough) {
+  constexpr Interval kAngles(360);
+  EXPECT_EQ(double{*kAngles.find(-360)}, -360);
+  EXPECT_EQ(double{*Interval(1, 2).find(1.5)}, 1.5);
+  for (const double number : {361.0, -1e300, std::numeric_limits<double>::infinity(),
+                              std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_FALSE(kAngles.find(number)) << number;
+  EXPECT_FALSE(Interval(1, 2).contains(0.5));
+}
+
+TEST(Finite, IsMadeByAnIntervalAlone) {
+  static_assert(!std::is_constructible_v<Finite, double>);
+  static_assert(!std::is_default_constructible_v<Finite>);
+  static_assert(std::is_convertible_v<Finite, double>);
+}
 
 TEST(CheckedSize, IsTheProductOrTheSum) {
   EXPECT_EQ((CheckedSize(3) * 4u * std::size_t{5} + 7).find(), 67);
