@@ -51,7 +51,7 @@ struct BeadRecord {
   std::int64_t num_beads = 0;
   double files_px = 0.0;                   ///< with the alignment of the files
   double before_px = 0.0, after_px = 0.0;  ///< with the new one, before and after beads were used
-  base::MeanGain gain = {};                ///< BeadAlignment::gain
+  base::MeanGain gain = {};                ///< the part by which the squared distances fell
   bool is_accepted = false;                ///< whether the new alignment uses them
 };
 
@@ -85,9 +85,10 @@ AlignmentRecord make_record(AlignmentOrigin origin, const tilt_series::PlannedSe
 void add_left_out(const tilt_series::PlannedSeries& series, const Alignment& first,
                   AlignmentRecord& record);
 
-/// Writes a record. Reads one that somebody may have changed: throws Error with what is wrong if no
-/// alignment could have written it. What is read is what was written, to the bit.
+/// Writes a record.
 nlohmann::json to_json(const AlignmentRecord& record);
+/// Reads a record that somebody may have changed. Throws Error with what is wrong if no alignment
+/// could have written it. What is read is what was written, to the bit.
 AlignmentRecord record_from(const nlohmann::json& json);
 
 }  // namespace tomofield::alignment

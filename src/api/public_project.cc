@@ -13,6 +13,10 @@
 namespace tomofield {
 
 Project open_project(const ProjectRequest& request) {
+  std::error_code unknown;
+  if (!std::filesystem::exists(request.path, unknown))
+    throw Error(fmt::format("there is no '{}': give a project, its folder or a stack",
+                            request.path.string()));
   option_table::Choices choices;
   choices.files.stack = request.path;
   choices.options.views.ignore = request.ignore;

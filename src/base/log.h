@@ -21,7 +21,7 @@ void log_warning(const std::string& message);
 /// Messages in the order in which they came.
 using LogMessages = std::vector<std::pair<LogLevel, std::string>>;
 
-/// Holds back all messages (log.h) while it lives, so that who prepares something says what was
+/// Holds back all messages while it lives, so that who prepares something says what was
 /// noticed when it is used. What nobody takes is sent at the end: an error follows its warnings.
 class HeldLog {
  public:

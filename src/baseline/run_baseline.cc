@@ -162,8 +162,8 @@ void check_options(const BaselineOptions& options) {
   if (options.shared.run.output.empty()) return;
   io::require_volume_name(options.shared.run.output);
   const output::OutputPaths paths = output::output_paths(options.shared.run.output);
-  std::vector<std::filesystem::path> results = paths.pictures();
-  results.insert(results.end(), {paths.volume, paths.json});
+  std::vector<std::filesystem::path> results{paths.volume, paths.json};
+  for (const auto& picture : paths.pictures()) results.push_back(picture);
   io::check_output_files(results, io::input_files(options.files), options.shared.run.overwrite,
                          kAdvice);
   if (options.shared.volume.zarr)

@@ -49,7 +49,7 @@ struct VolumeScore {
 };
 
 /// Computes the reprojection error of a volume (reprojection_errors()). Throws Error for a volume
-/// that is not of the region of interest, and for a series that read_tilt_series() refuses.
+/// that is not of the region of interest, and for a series that cannot be read.
 VolumeScore score_volume(const VolumeScoreOptions& options);
 
 }  // namespace tomofield::evaluate

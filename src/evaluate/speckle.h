@@ -22,14 +22,15 @@ struct VoxelBlock {
   }
 };
 
+/// Returns a whole volume as a block.
 inline VoxelBlock block_of(const base::Volume& volume) {
   const base::Shape3& shape = volume.shape;
   return {volume.data.data(), shape, shape.nx, shape.nx * shape.ny};
 }
 
-/// A speckle is a voxel that lies further than one standard deviation of the volume from the median
-/// of the 3 × 3 × 3 voxels around it, itself included. Voxels at the faces of the volume, which
-/// lack some of these neighbours, are left out.
+// A speckle is a voxel that lies further than one standard deviation of the volume from the median
+// of the 3 × 3 × 3 voxels around it, itself included. Voxels at the faces of the volume, which
+// lack some of these neighbours, are left out.
 
 /// Counts the speckles of a block. The block's outermost voxels are neighbours only.
 /// `deviation` is the standard deviation of the volume that the block is from.

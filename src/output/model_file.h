@@ -18,11 +18,10 @@
 #include "measurement/measurement.h"
 #include "tomofield/options.h"
 
-// Declares what the writer and the reader of model files share (model_writer.cc, model_file.cc).
-
 namespace tomofield::output {
 
-// These values are in files: do not change one without a new version.
+// The writer (model_writer.cc) and the reader (model_file.cc) of model files share these values.
+// They are in files: do not change one without a new version.
 inline constexpr const char* kFormat = "tomofield model";
 inline constexpr std::int64_t kFormatVersion = 2;
 inline constexpr std::int64_t kCompactVersion = 3;  ///< of models with codes in place of parameters

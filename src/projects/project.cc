@@ -110,6 +110,9 @@ std::optional<Project> read_project(const Request& request) {
   else if (!fs::exists(request.path, absent))
     return std::nullopt;
   if (main.format == nullptr) return std::nullopt;
+  if (!request.series.empty() && !main.format->has_several)
+    throw Error(fmt::format("'{}' is one series, so leave --series {} out", request.path.string(),
+                            request.series));
   Request of_file = request;
   of_file.path = main.path;
   Project project(of_file);

@@ -69,6 +69,7 @@ struct Format {
   /// A folder is read by the main files of the lowest rank that it has: files that say how a series
   /// is aligned come before those that only accompany it.
   int rank = 0;
+  bool has_several = false;  ///< a project may have several series, of which --series names one
 };
 
 /// Returns all kinds of projects.

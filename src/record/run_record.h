@@ -22,7 +22,7 @@ namespace tomofield::record {
 struct FitRecord {
   FitMetrics metrics;
   verdict::Verdict verdict;
-  std::optional<alignment::AlignmentRecord> alignment;  ///< before the fit
+  std::optional<alignment::AlignmentRecord> alignment;  ///< that was made before the fit, if any
   std::optional<tune::TunedFit> tuned;                  ///< the trials that chose settings
 };
 

@@ -1,8 +1,11 @@
 #include "tilt_series/planned_series.h"
 
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <utility>
 
+#include "io/saving/file_identity.h"
 #include "io/tables/mdoc_images.h"
 #include "tilt_series/decode_view.h"
 #include "tilt_series/half_stacks.h"
@@ -10,14 +13,31 @@
 #include "tilt_series/own_views.h"
 #include "tilt_series/resampling/binning.h"
 #include "tilt_series/view_store.h"
+#include "tomofield/error.h"
 
 namespace tomofield::tilt_series {
 namespace {
 
+// Refuses halves that are one file, or that are the stack of all frames: their noise would be one.
+void require_two_halves(const TiltSeriesOptions& options) {
+  const std::filesystem::path &even = *options.even, &odd = *options.odd;
+  const auto refuse_if_same = [](const std::filesystem::path& a, const std::filesystem::path& b,
+                                 const char* what) {
+    if (io::identity_of(a) == io::identity_of(b))
+      throw Error(fmt::format("'{}' and '{}' are one file: {}", a.string(), b.string(), what));
+  };
+  refuse_if_same(even, odd, "give --even and --odd the stacks of two halves of the frames");
+  if (options.images) return;
+  for (const auto& half : {even, odd})
+    refuse_if_same(half, options.stack, "a half of the frames is not the stack of all of them");
+}
+
 // Refuses files beside the stack that do not fit it, before any view is decoded.
 void check_companions(const TiltSeriesOptions& options, const io::ImageStack& stack) {
   if (options.mask) open_mask(*options.mask, stack);
-  if (options.even && options.odd) HalfStacks({*options.even, *options.odd}, stack);
+  if (!options.even || !options.odd) return;
+  require_two_halves(options);
+  HalfStacks({*options.even, *options.odd}, stack);
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ struct ViewTransfer;
 
 namespace tomofield::tilt_series {
 
-/// What one look at every view of a series has found, and what decodes a view again in its light.
+/// What one look at every view of a series has found, and a decoder that uses it.
 struct Survey {
   explicit Survey(const PlannedSeries& series);
 

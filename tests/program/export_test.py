@@ -168,6 +168,10 @@ def test_options_that_make_no_sense_are_refused():
     expect_refusal(["--voxel-size"], "model.h5", "-o", "new.mrc", "--voxel-size", "0")
     expect_refusal(["--bin"], "model.h5", "-o", "new.mrc", "--voxel-size", "9", "--bin", "2")
     expect_refusal(["--mode"], "model.h5", "-o", "new.mrc", "--mode", "4")
+    expect_refusal(["--level"], "model.h5", "-o", "new.mrc", "--level", "")
+    expect_refusal(["--zarr"], "model.h5", "-o", "new.mrc", "--zarr-version", "0.5")
+    for words in (["--level", "3,2"], ["--rotate", "3,2,1"], ["--angpix", "5"]):
+        expect_refusal(["--compact"], "model.h5", "--compact", "c.h5", *words)
 
 
 def test_damaged_and_foreign_models_are_refused():

@@ -326,7 +326,9 @@ def test_the_log_says_that_halves_have_no_prior():
 def test_refusals(series):
     results = fresh("refused")
     small = series.write("small", series.odd[:, 1:])
-    noise = series.write("noise", np.random.default_rng(1).normal(9, 1, series.odd.shape))
+    noise, other_noise = (
+        series.write(f"noise{i}", np.random.default_rng(i).normal(9, 1, series.odd.shape))
+        for i in (1, 2))
     holes = series.odd.copy()
     holes[3, 4, 5] = np.nan
     holes = series.write("holes", holes)
@@ -335,7 +337,9 @@ def test_refusals(series):
             (["--even", even], "give both"),
             (["--even", even, "--odd", odd, "--split-tilts"], "choose one of them"),
             (["--even", even, "--odd", small], "the same sections"),
-            (["--even", noise, "--odd", noise], "are no halves of"),
+            (["--even", noise, "--odd", other_noise], "are no halves of"),
+            (["--even", even, "--odd", even], "are one file"),
+            (["--even", series.stack, "--odd", odd], "are one file"),
             (["--even", even, "--odd", holes], "section 4"),
             (["--even", even, "--odd", even + ".no"], "even.mrc.no"),
             (["--split-tilts", "--exclude", "1-14"], "8 views or more"),

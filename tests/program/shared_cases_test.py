@@ -73,10 +73,12 @@ def test_aretomo3_dark_section_zero_with_offset(case):
 
 
 def test_batch_halves(case):
-    """The page of batch says that these options are for a table."""
+    """Options of halves hold on the command line of batch."""
     case("batch_halves")
-    page = harness.read_bytes(os.path.join(os.path.dirname(__file__), "../../docs/batch.md")).decode()
-    expect(page, "`even`", "`odd`")
+    frames = ["--even", "{folder}/{name}_EVN.mrc", "--odd", "{folder}/{name}_ODD.mrc"]
+    for options in (frames, [*frames, "--denoising-halves"], ["--split-tilts"]):
+        expect(output_of("batch", "*.aln", *options, "-o", "res", "--dry-run"),
+               "2 of 2 series to reconstruct")
 
 
 def test_black_half_stack(case):

@@ -7,11 +7,11 @@
 
 namespace tomofield::baseline {
 
-/// The functions below are the parts of a step of SIRT or SART with some of the views, a pair of
-/// slabs at a time:
-///   x ← x + relaxation · C Aᵀ R W (b − A x)
-/// R holds the inverse row sums of A, W = 1/σ² of each view, and C the inverse column sums of W A
-/// over the rays that count.
+// The functions below are the parts of a step of SIRT or SART with some of the views, a pair of
+// slabs at a time:
+//   x ← x + relaxation · C Aᵀ R W (b − A x)
+// R holds the inverse row sums of A, W = 1/σ² of each view, and C the inverse column sums of W A
+// over the rays that count.
 
 /// Multiplies detectors of residuals by W R; returns Σ residual² W R.
 double weigh_rays(const VoxelProblem& problem, const SlabPair& slabs, std::span<const int> views,

@@ -8,9 +8,9 @@
 
 namespace tomofield::cli {
 
-// Each adds one subcommand to the program; the subcommand's callback does the
-// work and throws tomofield::Error for the user's mistakes. One file each:
-// src/cli/NAME_command.cc.
+// Each function adds one subcommand to the program; the subcommand's callback does the work and
+// throws tomofield::Error for the user's mistakes. One file each: src/cli/commands/NAME_command.cc.
+
 /// The metrics list `origins`, the settings that come from a project (project_arguments.h). They
 /// may change until the command runs.
 void add_align_command(CLI::App& program, const std::vector<Setting>& origins);

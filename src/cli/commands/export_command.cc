@@ -89,10 +89,25 @@ std::vector<double> parse_numbers(const std::string& text, std::size_t count,
   throw Error(fmt::format("'{}' is not {}", text, what));
 }
 
+// Returns the angles that the alignment found, and says which they are.
+output::Levelling found_levelling(const ExportArguments& arguments) {
+  constexpr double kUsual_deg = 12.0;  // sections of frozen cells lie flatter
+  const output::Levelling found = output::found_levelling(arguments.model);
+  const std::string angles = fmt::format("a pitch of {:.1f}° and a tilt about X of {:.1f}°",
+                                         found.pitch_deg, found.x_tilt_deg);
+  base::log_info(fmt::format("levelled by {}; 0 is what the views are not sure of", angles));
+  if (std::abs(found.pitch_deg) > kUsual_deg || std::abs(found.x_tilt_deg) > kUsual_deg / 2)
+    base::log_warning(fmt::format(
+        "{} are much for a frozen specimen, and noisy views give angles that are surer than "
+        "right: look at the XZ and YZ planes, or give --level PITCH,X_TILT",
+        angles));
+  return found;
+}
+
 output::Levelling levelling_of(const ExportArguments& arguments) {
   constexpr double kLargest_deg = 90.0;
   if (arguments.level.empty()) return {};
-  if (arguments.level == kFound) return output::found_levelling(arguments.model);
+  if (arguments.level == kFound) return found_levelling(arguments);
   const auto angles =
       parse_numbers(arguments.level, 2, "PITCH,X_TILT in degrees, or 'found' (--level)");
   for (const double angle : angles)
@@ -281,6 +296,9 @@ void add_box_options(CLI::App& command, ExportArguments& arguments) {
                   "as --tilt-offset PITCH and --x-axis-tilt X_TILT would")
       ->type_name("found|PITCH,X_TILT")
       ->excludes(rotate)
+      ->check([](const std::string& text) {
+        return text.empty() ? std::string("give 'found', or PITCH,X_TILT in degrees") : "";
+      })
       ->group(group);
 
   const CLI::Validator positive = number_between(1e-3, 1e6);
@@ -334,8 +352,12 @@ void add_export_command(CLI::App& program) {
       ->type_name("NAME")
       ->needs(particles);
   add_groups(*command, arguments->choices, {option_table::Group::kVolume});
+  command->get_option("--zarr-version")->needs(command->get_option("--zarr"));
   for (const char* of_volume : {"--center", "--rotate", "--zarr", "--axes"})
     particles->excludes(command->get_option(of_volume));
+  for (const char* of_volume :
+       {"--box", "--center", "--rotate", "--level", "--voxel-size", "--bin", "--zarr", "--axes"})
+    compact->excludes(command->get_option(of_volume));
   add_common_options(*command);
   add_help_all(*command);
   command->callback([arguments] { run_export(*arguments); });
