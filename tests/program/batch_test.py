@@ -104,8 +104,12 @@ def test_names_are_filled_in_for_each_series(data):
              if value.strip("` ").startswith("FILE") and flag not in OWN]
     assert {"--even", "--odd", "--mdoc", "--xf", "--aln", "--ctf", "--mask", "--local"} <= set(files)
     files.remove("--fiducials")  # these are read with the views, after the plan
+    halves = harness.fresh_directory("other_halves")
+    for name in "ab":
+        shutil.copy(os.path.join(data, name + ".mrc"), halves)
+    half = halves + "/{name}.mrc"
     # What an option needs beside it.
-    others = {"--even": ["--odd", "{folder}/{name}.mrc"], "--odd": ["--even", "{folder}/{name}.mrc"],
+    others = {"--even": ["--odd", half], "--odd": ["--even", half],
               "--mtf": ["--defocus", 3]}
     for flag in files:
         angles = [] if flag == "--tlt" else ["--tlt", "{folder}/{name}.tlt"]
