@@ -18,10 +18,7 @@ inline void write_volume_file(const base::Volume& volume, const std::filesystem:
   spec.voxel_size_A.fill(volume.voxel_size_A);
   spec.origin_A = {-10, -20, -30};
   io::MrcWriter file(path, spec);
-  const auto section = static_cast<std::size_t>(nx * ny);
-  for (std::int64_t z = 0; z < nz; ++z)
-    file.write_section(
-        z, std::span(volume.data).subspan(static_cast<std::size_t>(z) * section, section));
+  file.write_sections(0, volume.data);
   file.close();
 }
 

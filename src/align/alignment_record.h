@@ -18,7 +18,8 @@
 
 namespace tomofield::alignment {
 
-/// What an alignment is made from: a copy of the series has the same. Checksums are in hexadecimal.
+/// Identifies what an alignment is made from. A copy of the series has the same origin. Checksums
+/// are in hexadecimal.
 struct AlignmentOrigin {
   std::int64_t num_sections = 0;                  ///< of the stack
   std::array<std::int64_t, 2> size_px{};          ///< width and height of a section
@@ -29,7 +30,7 @@ struct AlignmentOrigin {
   bool operator==(const AlignmentOrigin&) const = default;
 };
 
-/// What an alignment found for one view: the change of the alignment that the files give, in pixels
+/// Describes how an alignment changes the alignment of one view that the files give, in pixels
 /// before binning.
 struct AlignedView {
   std::int64_t section = 0;  ///< of the stack, from 0
@@ -46,7 +47,8 @@ struct AlignedView {
   bool operator==(const AlignedView&) const = default;
 };
 
-/// How far gold beads lie from their places, root mean square in x and y, in pixels before binning.
+/// Tells how far gold beads lie from their places: the root mean square in x and y, in pixels
+/// before binning.
 struct BeadRecord {
   std::int64_t num_beads = 0;
   double files_px = 0.0;                   ///< with the alignment of the files
@@ -62,7 +64,7 @@ struct LocalRecord {
   double rms_px = 0.0;              ///< of the motion, if it was accepted
 };
 
-/// The record of an alignment (NAME_align.json): what was found for each view, and what from.
+/// The record of an alignment (NAME_align.json) tells what was found for each view, and from what.
 struct AlignmentRecord {
   AlignmentOrigin origin = {};
   bool is_accepted = false;  ///< else the alignment of the files is kept

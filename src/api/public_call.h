@@ -7,7 +7,7 @@
 #include "io/images/image_stack.h"
 #include "tomofield/reconstruct.h"
 
-// What the public functions that work on a tilt series have in common.
+// The public functions that work on a tilt series share these.
 namespace tomofield {
 
 struct TiltSeries::Impl {

@@ -74,10 +74,7 @@ void write_mrc(const Tomogram& volume, const std::filesystem::path& path, bool o
   // A label that began with "tomofield" would say that the file is no tilt series.
   spec.labels = {fmt::format("values in memory, written by tomofield {}", library_version())};
   io::MrcWriter file(path, spec);
-  const auto section = static_cast<std::size_t>(nx * ny);
-  for (std::int64_t z = 0; z < nz; ++z)
-    file.write_section(
-        z, std::span(volume.values).subspan(static_cast<std::size_t>(z) * section, section));
+  file.write_sections(0, volume.values);
   file.close();
 }
 

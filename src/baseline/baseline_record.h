@@ -11,7 +11,7 @@
 
 namespace tomofield::baseline {
 
-/// What is recorded of a finished run.
+/// Refers to all that is recorded of a finished run.
 struct BaselineRecord {
   const BaselineOptions& options;  ///< with the method that trials chose
   const measurement::Measurement& series;

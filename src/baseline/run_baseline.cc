@@ -157,6 +157,7 @@ tilt_series::TiltSeriesOptions BaselineOptions::input() const {
 void check_options(const BaselineOptions& options) {
   constexpr const char* kAdvice = "give --overwrite to replace it, or another name with -o";
   base::require_no_faults(option_table::range_faults(options.shared));
+  base::require_no_faults(output::faults_of(options.shared.volume));
   const auto faults = measurement::faults_of_transfer(options.files, options.shared.views);
   base::require_no_faults({faults.begin(), faults.end()});
   if (options.shared.run.output.empty()) return;

@@ -10,8 +10,7 @@
 
 namespace tomofield::checkpoint {
 
-/// What is recorded of a tile that is fitted and compressed. Rows count from the first one of the
-/// region.
+/// Describes a tile that is fitted and compressed. Rows count from the first one of the region.
 struct FinishedTile {
   base::Range rows = {};                      ///< its own
   base::Range fitted_rows = {};               ///< with those beside them

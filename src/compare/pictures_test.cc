@@ -7,7 +7,7 @@ namespace {
 
 // Returns a flat plane with a checkerboard from column and row 60 on.
 report::Slice plane_with_texture() {
-  report::Slice plane("xy", 128, 96);
+  report::Slice plane(128, 96);
   for (std::int64_t y = 60; y < 90; ++y) {
     for (std::int64_t x = 60; x < 90; ++x) plane.row(y)[x] = static_cast<float>((x + y) % 2);
   }
@@ -23,7 +23,7 @@ TEST(BusiestDetail, LiesWhereThePlaneVariesMost) {
 }
 
 TEST(BusiestDetail, FitsIntoSmallPlanes) {
-  const Rectangle detail = busiest_detail(report::Slice("xy", 20, 9));
+  const Rectangle detail = busiest_detail(report::Slice(20, 9));
   EXPECT_EQ(detail.x1, 9);
   EXPECT_EQ(detail.y1, 9);
 }

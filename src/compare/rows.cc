@@ -23,9 +23,9 @@ namespace fs = std::filesystem;
 constexpr const char* kAdvice =
     "give another folder with -o, or --overwrite to make everything in this one again";
 
-Error not_of_this_comparison(const fs::path& file, const std::string& why) {
-  return Error(
-      fmt::format("'{}' is not what this comparison wrote ({}): {}", file.string(), why, kAdvice));
+std::string not_of_this_comparison(const fs::path& file, const std::string& why) {
+  return fmt::format("'{}' is not what this comparison wrote ({}): {}", file.string(), why,
+                     kAdvice);
 }
 
 std::string command_text(const json& command) {
@@ -92,7 +92,7 @@ record::RunSummary summary_of(const Row& row) {
   try {
     return record::read_summary(file);
   } catch (const Error& fault) {
-    throw not_of_this_comparison(file, fault.what());
+    throw Error(not_of_this_comparison(file, fault.what()));
   }
 }
 
@@ -146,9 +146,8 @@ RowState read_row(const fs::path& file, const json& origin) {
                      io::number_at(row, "wall_seconds", 0, base::kLargestNumber),
                      io::integer_at(row, "peak_bytes", 0, INT64_MAX)}};
   };
-  const RowState state = io::read_record(file, read, [&](const std::string& why) {
-    return std::string(not_of_this_comparison(file, why).what());
-  });
+  const RowState state = io::read_record(
+      file, read, [&](const std::string& why) { return not_of_this_comparison(file, why); });
   if (differences.empty()) return state;
   throw Error(fmt::format("what '{}' tells of cannot be kept: {}: {}", file.string(),
                           fmt::join(differences, "; "), kAdvice));

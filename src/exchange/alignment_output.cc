@@ -36,8 +36,7 @@ std::vector<io::OutputLock> claim_alignment(const options::ReconstructOptions& o
 void write_alignment_results(const tilt_series::PlannedSeries& series,
                              const options::ReconstructOptions& options) {
   if (options.run.align == Alignment::kOff) return;
-  const auto stack = tilt_series::open_views(options.input());
-  const io::MrcHeader& header = stack->header();
+  const io::MrcHeader& header = series.stack().header();
   output::write_alignment_files(
       series, {header.nx, header.ny, header.nz},
       output::alignment_files(output::output_paths(options.run.output).alignment_prefix));

@@ -40,7 +40,6 @@ void write_relion_alignment(const tilt_series::PlannedSeries& series,
   const std::optional<fs::path> path = relion_alignment(options);
   if (!path) return;
   const io::ViewTable listed = io::read_relion_views(options.files.stack);
-  const auto stack = tilt_series::open_views(options.input());
   const double pixel_size_A = series.pixel_size_A() / series.bin_factor();
   std::vector<std::size_t> sections;
   for (const tilt_series::View& view : series.views())
@@ -48,8 +47,8 @@ void write_relion_alignment(const tilt_series::PlannedSeries& series,
   io::StarTable table = io::read_relion_rows(options.files.stack).only(sections);
   for (std::size_t view = 0; view < sections.size(); ++view) {
     io::ListedView aligned = listed.views.at(sections[view]);
-    tilt_series::set_alignment(aligned_section(series, view), listed.centre, stack->header(),
-                               pixel_size_A, aligned);
+    tilt_series::set_alignment(aligned_section(series, view), listed.centre,
+                               series.stack().header(), pixel_size_A, aligned);
     io::set_relion_alignment(aligned, view, table);
   }
   io::write_text_file(*path, io::star_file_text(table));

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 #include <string>
 
 #include "io/tables/text_lines.h"
@@ -92,10 +91,6 @@ std::vector<double> numbers_at(const json& object, const char* key, double low, 
   std::vector<double> numbers;
   for (const json& value : values) numbers.push_back(number_in(value, key, low, high));
   return numbers;
-}
-
-double number_or_nan(const json& value) {
-  return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace tomofield::io

@@ -50,9 +50,6 @@ std::int64_t integer_at(const nlohmann::json& object, const char* key, std::int6
 std::vector<double> numbers_at(const nlohmann::json& object, const char* key, double low,
                                double high);
 
-/// Returns a number, or NaN for any other value, such as the null that stands for NaN in JSON.
-double number_or_nan(const nlohmann::json& value);
-
 /// Returns what `read` makes of a JSON file. If the file cannot be read, or has mistakes, it throws
 /// Error with what `sentence` makes of the reason; the sentence names the file.
 template <typename Read, typename Sentence>

@@ -48,8 +48,8 @@ struct Sections {
 
 Sections sections_of(const tilt_series::TiltSeriesOptions& input,
                      const tilt_series::PlannedSeries& series) {
-  const auto stack = tilt_series::open_views(input);
-  Sections sections{input, stack->name(), stack->header().nz, {}};
+  const io::ImageStack& stack = series.stack();
+  Sections sections{input, stack.name(), stack.header().nz, {}};
   sections.tilt_deg.resize(static_cast<std::size_t>(sections.count));
   for (const tilt_series::View& view : series.views())
     sections.tilt_deg[static_cast<std::size_t>(view.section)] =

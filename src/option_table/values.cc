@@ -312,8 +312,6 @@ std::vector<std::string> range_faults(const Options& options) {
       }
     });
   }
-  if (options.volume.zarr_version != VolumeOptions{}.zarr_version && !options.volume.zarr)
-    faults.emplace_back("--zarr-version says how --zarr writes the volume: give --zarr as well");
   return faults;
 }
 

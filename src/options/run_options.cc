@@ -112,6 +112,7 @@ int ReconstructOptions::num_trials(int num_fitted_views,
 
 std::vector<std::string> ReconstructOptions::faults() const {
   std::vector<std::string> all = option_table::range_faults(*this);
+  for (std::string& fault : output::faults_of(volume)) all.push_back(std::move(fault));
   const auto refuse_if = [&](bool is_fault, const char* sentence) {
     if (is_fault) all.emplace_back(sentence);
   };

@@ -11,7 +11,7 @@
 // Metrics that the records of several commands have.
 namespace tomofield::output {
 
-/// What is masked in the views of a measurement.
+/// Tells what is masked in the views of a measurement.
 struct MaskedViews {
   tilt_series::MaskMetrics masks;
   std::vector<double> tilt_deg;  ///< [view], in the stack's order

@@ -137,6 +137,11 @@ double int16_factor(double largest_value, std::string& label) {
   return factor;
 }
 
+std::vector<std::string> faults_of(const VolumeOptions& options) {
+  if (options.zarr || options.zarr_version == VolumeOptions{}.zarr_version) return {};
+  return {"--zarr-version says how --zarr writes the volume: give --zarr as well"};
+}
+
 std::filesystem::path zarr_path(const std::filesystem::path& volume) {
   std::filesystem::path path = volume;
   return path.replace_extension(".zarr");

@@ -31,6 +31,9 @@ io::MrcMode mrc_mode(VoxelType type);
 /// adds that to the label of the header.
 double int16_factor(double largest_value, std::string& label);
 
+/// Returns a sentence for each option of a volume that does not go with another one.
+std::vector<std::string> faults_of(const VolumeOptions& options);
+
 /// Returns the folder of a volume's copy as OME-Zarr: NAME.zarr beside NAME.mrc.
 std::filesystem::path zarr_path(const std::filesystem::path& volume);
 

@@ -14,7 +14,7 @@
 
 namespace tomofield::record {
 
-/// What a fit found for a view. Offset and noise are in the units of the stack.
+/// Describes a view as a fit found it. Offset and noise are in the units of the stack.
 struct ViewMetrics {
   double tilt_deg = 0.0;
   double scale = 0.0, offset = 0.0;
@@ -37,7 +37,7 @@ struct HeldOutMetrics {
   std::vector<double> error_by_epoch;  ///< if the epochs were scored
 };
 
-/// What is measured on a finished fit.
+/// Collects what is measured on a finished fit.
 struct FitMetrics {
   std::size_t num_parameters = 0;
   std::int64_t num_leaves = 0;

@@ -18,7 +18,7 @@
 
 namespace tomofield::record {
 
-/// What is recorded of one fit of a run.
+/// Collects what is recorded of one fit of a run.
 struct FitRecord {
   FitMetrics metrics;
   verdict::Verdict verdict;

@@ -7,7 +7,7 @@
 
 namespace tomofield::record {
 
-/// What tables say of a finished run or baseline.
+/// Collects what tables say of a finished run or baseline.
 struct RunSummary {
   std::optional<double> num_parameters;
   std::optional<double> held_out_error;  ///< none if no views were held out

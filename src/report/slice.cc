@@ -20,7 +20,7 @@ constexpr std::int64_t kChunkValues = std::int64_t{1} << 18;
 
 Slice Slice::cut(std::int64_t x0, std::int64_t y0, std::int64_t x1, std::int64_t y1) const {
   TOMOFIELD_CHECK(x0 >= 0 && y0 >= 0 && x1 <= width && y1 <= height, "a part beyond a slice");
-  Slice part(name, x1 - x0, y1 - y0);
+  Slice part(x1 - x0, y1 - y0);
   for (std::int64_t y = y0; y < y1; ++y) std::copy(row(y) + x0, row(y) + x1, part.row(y - y0));
   return part;
 }
@@ -28,7 +28,7 @@ Slice Slice::cut(std::int64_t x0, std::int64_t y0, std::int64_t x1, std::int64_t
 std::vector<Slice> read_central_slices(const std::filesystem::path& mrc) {
   const io::MrcReader file(mrc);
   const io::MrcHeader& h = file.header();
-  std::vector<Slice> slices{{"xy", h.nx, h.ny}, {"xz", h.nx, h.nz}, {"yz", h.ny, h.nz}};
+  std::vector<Slice> slices{{h.nx, h.ny}, {h.nx, h.nz}, {h.ny, h.nz}};
   Slice &xy = slices[0], &xz = slices[1], &yz = slices[2];
   file.read_section(h.nz / 2, xy.values);
   const std::int64_t chunk = std::clamp<std::int64_t>(kChunkValues / h.nx, 1, h.ny);

@@ -27,14 +27,13 @@ std::int64_t picture_zoom(std::int64_t narrowest, std::int64_t widest);
 
 /// One plane of a volume: values[row × width + column]. The first row is at the bottom.
 struct Slice {
-  Slice(std::string axes, std::int64_t w, std::int64_t h)
-      : name(std::move(axes)), width(w), height(h), values(static_cast<std::size_t>(w * h)) {}
+  Slice(std::int64_t w, std::int64_t h)
+      : width(w), height(h), values(static_cast<std::size_t>(w * h)) {}
   float* row(std::int64_t y) { return values.data() + y * width; }
   const float* row(std::int64_t y) const { return values.data() + y * width; }
   /// Returns columns x0 … x1 − 1 and rows y0 … y1 − 1.
   Slice cut(std::int64_t x0, std::int64_t y0, std::int64_t x1, std::int64_t y1) const;
 
-  std::string name;  ///< its axes: xy, xz or yz, the first to the right
   std::int64_t width, height;
   std::vector<float> values;
 };

@@ -241,10 +241,7 @@ void write_volume(const fs::path& path, const base::Volume& volume, io::MrcMode 
   io::MrcSpec spec = mrc_spec(shape.nx, shape.ny, shape.nz, true, options, what);
   spec.mode = mode;
   io::MrcWriter writer(path, spec);
-  const auto section = static_cast<std::size_t>(shape.nx * shape.ny);
-  for (std::int64_t z = 0; z < shape.nz; ++z)
-    writer.write_section(
-        z, std::span(volume.data).subspan(static_cast<std::size_t>(z) * section, section));
+  writer.write_sections(0, volume.data);
   writer.close();
 }
 

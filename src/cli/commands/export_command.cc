@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/check.h"
 #include "base/log.h"
 #include "cli/commands/commands.h"
 #include "cli/options/common_options.h"
@@ -62,6 +63,7 @@ std::vector<io::OutputLock> claim_output(const ExportArguments& arguments) {
       arguments.compact.empty() ? arguments.output : arguments.compact;
   return io::claim_outputs({written}, [&] {
     constexpr const char* kAdvice = "give another name, or --overwrite to replace it";
+    base::require_no_faults(output::faults_of(arguments.choices.options.volume));
     std::vector<std::filesystem::path> results{written}, inputs{arguments.model};
     if (!arguments.particles.empty()) {
       results.push_back(exchange::particle_star(written));
@@ -352,7 +354,6 @@ void add_export_command(CLI::App& program) {
       ->type_name("NAME")
       ->needs(particles);
   add_groups(*command, arguments->choices, {option_table::Group::kVolume});
-  command->get_option("--zarr-version")->needs(command->get_option("--zarr"));
   for (const char* of_volume : {"--center", "--rotate", "--zarr", "--axes"})
     particles->excludes(command->get_option(of_volume));
   for (const char* of_volume :

@@ -85,13 +85,14 @@ std::optional<Point> angles_of(const io::StarRow& row, const std::array<const ch
   return Point{*rot, *tilt, *psi};
 }
 
-Particle relion_particle(const io::StarRow& row, const output::ModelInfo& model,
+/// Returns a particle whose coordinates count from `centre`, a point of the volume.
+Particle relion_particle(const io::StarRow& row, const Point& centre, double pixel_A,
                          double unbinned_A) {
   constexpr double kLargest_A = 1e8;
-  Particle particle{.place_px = output::VolumeFrame(model).centre()};
+  Particle particle{.place_px = centre};
   for (std::size_t a = 0; a < 3; ++a)
     particle.place_px[a] +=
-        (row.number(kCoordinates[a], kLargest_A) + kCentre_px * unbinned_A) / model.pixel_size_A;
+        (row.number(kCoordinates[a], kLargest_A) + kCentre_px * unbinned_A) / pixel_A;
   if (const auto angles = angles_of(row, kSubtomogramAngles))
     particle.volume_from_box = field::rotation_from_euler((*angles)[0], (*angles)[1], (*angles)[2]);
   return particle;
@@ -114,10 +115,12 @@ ParticleList read_relion(const fs::path& path, const fs::path& model_file,
   if (const auto optics = std::ranges::find(tables, "optics", &io::StarTable::name);
       optics != tables.end())
     list.optics = *optics;
+  const Point centre = output::VolumeFrame(model).centre();
+  const double of_model_A = unbinned_pixel_A(model);
   for (std::size_t row = 0; row < list.table.num_rows(); ++row) {
-    const auto unbinned_A = series_pixel_A(path, list.optics, list.table.find(row, kOpticsGroup));
-    list.particles.push_back(relion_particle(io::StarRow(path, list.table, row), model,
-                                             unbinned_A.value_or(unbinned_pixel_A(model))));
+    const auto of_series_A = series_pixel_A(path, list.optics, list.table.find(row, kOpticsGroup));
+    list.particles.push_back(relion_particle(io::StarRow(path, list.table, row), centre,
+                                             model.pixel_size_A, of_series_A.value_or(of_model_A)));
   }
   return list;
 }

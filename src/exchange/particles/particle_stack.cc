@@ -98,13 +98,10 @@ std::size_t write_particles(const output::Model& model, ParticleList list,
   io::MrcWriter file(stack, spec);
   const output::BoxBounds region = output::region_bounds(model);
   std::size_t num_cut = 0;
-  const std::size_t plane = static_cast<std::size_t>(boxes.size * boxes.size);
   for (std::size_t p = 0; p < places.size(); ++p) {
     std::vector<float> values = output::sample_box(model, places[p]);
     for (float& value : values) value = static_cast<float>(scale) * value + 0.0f;  // no −0
-    for (std::int64_t z = 0; z < boxes.size; ++z)
-      file.write_section(static_cast<std::int64_t>(p) * boxes.size + z,
-                         std::span(values).subspan(static_cast<std::size_t>(z) * plane, plane));
+    file.write_sections(static_cast<std::int64_t>(p) * boxes.size, values);
     if (output::BoxBounds(places[p]).axis_beyond(region, 0.5 * boxes.voxel_px)) ++num_cut;
   }
   file.close();

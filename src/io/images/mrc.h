@@ -99,6 +99,8 @@ class MrcWriter {
   MrcWriter(MrcWriter&&) noexcept;
 
   void write_section(std::int64_t section, std::span<const float> values);
+  /// Writes consecutive sections from `first` on, as many as there are values for.
+  void write_sections(std::int64_t first, std::span<const float> values);
   void write_rows(std::int64_t section, std::int64_t first_row, std::int64_t num_rows,
                   std::span<const float> values);
   void close();

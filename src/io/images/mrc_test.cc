@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numeric>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/threads/parallel.h"
@@ -178,6 +180,19 @@ TEST(Mrc, IntegersRoundAndSaturate) {
   EXPECT_EQ(written(MrcMode::kInt8), (std::vector<float>{0, 1, -2, 127, -128, 0}));
   EXPECT_EQ(written(MrcMode::kInt16), (std::vector<float>{0, 1, -2, 32767, -32768, 0}));
   EXPECT_EQ(written(MrcMode::kUint16), (std::vector<float>{0, 1, 0, 65535, 0, 0}));
+}
+
+TEST(Mrc, ConsecutiveSectionsAreWrittenTogether) {
+  const ScratchDirectory scratch;
+  std::vector<float> values(2 * 3 * 4);
+  std::iota(values.begin(), values.end(), 1.0f);
+  MrcWriter writer(scratch / "a.mrc", spec_of(2, 3, 4));
+  writer.write_sections(1, std::span(values).subspan(6));
+  writer.write_sections(0, std::span(values).first(6));
+  EXPECT_THROW(writer.write_sections(0, std::span(values).first(7)), std::logic_error);
+  EXPECT_THROW(writer.write_sections(3, std::span(values).first(12)), std::logic_error);
+  writer.close();
+  EXPECT_EQ(read_all(scratch / "a.mrc"), values);
 }
 
 TEST(Mrc, UnwrittenRowsAreZeroAndCounted) {

@@ -149,6 +149,17 @@ void MrcWriter::write_section(std::int64_t section, std::span<const float> value
   write_rows(section, 0, impl_->header.ny, values);
 }
 
+void MrcWriter::write_sections(std::int64_t first, std::span<const float> values) {
+  const MrcHeader& header = impl_->header;
+  const auto plane = static_cast<std::size_t>(header.nx * header.ny);
+  const auto count = static_cast<std::int64_t>(values.size() / plane);
+  TOMOFIELD_CHECK(values.size() % plane == 0 && first >= 0 && first + count <= header.nz,
+                  fmt::format("{} values from section {} on are no sections of the file",
+                              values.size(), first));
+  for (std::size_t at = 0; at < values.size(); at += plane)
+    write_section(first + static_cast<std::int64_t>(at / plane), values.subspan(at, plane));
+}
+
 void MrcWriter::write_rows(std::int64_t section, std::int64_t first_row, std::int64_t num_rows,
                            std::span<const float> values) {
   const MrcHeader& header = impl_->header;

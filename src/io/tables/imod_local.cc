@@ -31,7 +31,7 @@ std::vector<double> numbers_of(const std::filesystem::path& path, const TextLine
   return numbers;
 }
 
-// What a first line says.
+// The numbers of the first line of a file.
 struct Head {
   ImodLocal grid;
   bool has_x_tilts = false, has_z_factors = false;
