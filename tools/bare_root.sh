@@ -51,6 +51,7 @@ in_bare_root() {
     set -euo pipefail
     root=$1 folder=$2 shares=$3
     shift 3
+    mount --bind "$root" "$root"  # a root that is a mount point can have namespaces of its own
     mount -t proc proc "$root/proc"
     mount --rbind /sys "$root/sys"
     mount --rbind /dev "$root/dev"
