@@ -1,5 +1,6 @@
 """Projects of other programs."""
 
+import difflib
 import html
 import os
 import pathlib
@@ -81,9 +82,15 @@ def chosen(choices: _core.Choices, given: Mapping[str, object]) -> _core.Choices
     """Set options among compiled choices, and return these."""
     for name, value in given.items():
         if name not in Options.__annotations__:
-            raise TypeError(f"there is no option '{name}'")
+            raise TypeError(f"there is no option '{name}'" + _alternative(name))
         try:
             setattr(choices, name, value)
         except TypeError:
             raise TypeError(f"the option {name} cannot be {value!r}") from None
     return choices
+
+
+def _alternative(name: str) -> str:
+    """Return a question with the option whose name is most like this one, if there is one."""
+    alike = difflib.get_close_matches(name, Options.__annotations__, n=1)
+    return f": do you mean '{alike[0]}'?" if alike else ""

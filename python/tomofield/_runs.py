@@ -63,7 +63,8 @@ class Reconstruction:
     def __repr__(self) -> str:
         if not self.is_finished:
             return "<Reconstruction that was stopped>"
-        return f"<Reconstruction: {self.tomogram or self.model or 'files'}; {self.verdict}>"
+        parts = [str(self.tomogram or self.model or "files"), self.verdict]
+        return f"<Reconstruction: {'; '.join(part for part in parts if part)}>"
 
     def _repr_html_(self) -> str:
         shown = self.tomogram or self.model
@@ -102,7 +103,7 @@ def denoise(made: Reconstruction, strength: Union[str, float], *, output: Path =
     strength: "light", "medium", "strong", or a factor of the weight, as the option `denoise`.
     output, overwrite, progress: as in reconstruct().
     """
-    if made._inputs is None or not made.is_finished:
+    if not isinstance(made, Reconstruction) or made._inputs is None or not made.is_finished:
         raise Error("only a finished result of reconstruct() can be denoised again")
     choices, core = made._inputs
     settled = choices.copy()

@@ -21,11 +21,18 @@ class Tomogram:
     """A volume in memory. numpy takes it for its array: np.mean(tomogram), tomogram[8].
 
     values: array [z, y, x], float32, in the units and the contrast of the tilt series.
-    voxel_size_A: side of a voxel in Å.
+    voxel_size_A: side of a voxel in Å, or 0 if nobody knows it.
     """
 
     values: Array
     voxel_size_A: float
+
+    def __post_init__(self) -> None:
+        if np.ndim(self.values) != 3:
+            raise Error(f"a tomogram has values [z, y, x], and these have {np.ndim(self.values)} "
+                        "dimensions")
+        if not 0 <= self.voxel_size_A < np.inf:
+            raise Error(f"a voxel cannot have a side of {self.voxel_size_A} Å")
 
     def __array__(self, dtype: Optional[npt.DTypeLike] = None) -> npt.NDArray[Any]:
         return np.asarray(self.values, dtype=dtype)
@@ -142,14 +149,14 @@ def export(model: Union[Model, Path], output: Path, *, box: Optional[Box] = None
            voxel_size_A: Optional[float] = None,
            voxel_type: Literal["float32", "float16", "int16"] = "float32",
            axes: Literal["xyz", "xzy"] = "xyz", invert: bool = False, zarr: bool = False,
-           overwrite: bool = False) -> None:
+           zarr_version: Literal["0.4", "0.5"] = "0.4", overwrite: bool = False) -> None:
     """Write a box of a model as an MRC volume, as `tomofield export` does.
 
     model: a model, or the path of its file.
     output: the volume to write, NAME.mrc.
     box: any box; by default the region of interest with voxels of voxel_size_A.
     voxel_size_A: side of its voxels in Å; by default that of the model's pixels.
-    voxel_type, axes, invert, zarr, overwrite: as in tomofield.Options.
+    voxel_type, axes, invert, zarr, zarr_version, overwrite: as in tomofield.Options.
     """
     if not isinstance(model, Model):
         model = Model(model)
@@ -157,7 +164,7 @@ def export(model: Union[Model, Path], output: Path, *, box: Optional[Box] = None
         raise Error("box states the size of its voxels (voxel_px): leave voxel_size_A out")
     choices = _core.Choices()
     for name, value in (("voxel_type", voxel_type), ("axes", axes), ("invert", invert),
-                        ("zarr", zarr), ("overwrite", overwrite)):
+                        ("zarr", zarr), ("zarr_version", zarr_version), ("overwrite", overwrite)):
         setattr(choices, name, value)
     chosen = model._region_of(voxel_size_A) if box is None else box
     _core.export_box(model._core, _core_box(chosen), os.fspath(output), choices)

@@ -121,6 +121,7 @@ def test_local_alignments_of_imod_are_applied():
     assert found.max() < 0.5 and found.mean() < 0.5 * without.mean(), (found, without)
     assert "TS_01local.xf from tilt.com: LOCALFILE" in printed.stdout, printed.stdout
     assert f"in {len(TILTS)} views" in printed.stderr, printed.stderr
+    assert "is it the one of this series" not in printed.stderr, printed.stderr
     # The option alone, and alignments of images with pixels twice as large.
     write_local(folder, "binned.xf", scale=2)
     found, _ = distances(folder, "TS_01.st", "--tlt", "TS_01.tlt", "--thickness", THICKNESS,
@@ -202,6 +203,19 @@ def test_patch_shifts_of_aretomo_are_applied():
     found, printed = distances(folder, *arguments)
     assert found.max() < 0.6 and found.mean() < 0.5 * without.mean(), (found, without)
     assert f"local alignment of 'TS_01.aln' in {len(TILTS)} views" in printed.stderr, printed.stderr
+
+
+def test_patch_shifts_that_no_specimen_has_are_named():
+    folder = fresh_directory("impossible")
+    write_views(folder, imod_place)
+    path = write_aln(folder, with_patches=False)
+    with open(path, "a", encoding="utf-8") as file:
+        file.write("# Local Alignment\n" + "".join(
+            f"0 {p} {x} {y} {60 if x > 0 else 0} 0 1.0\n" for p, (x, y) in enumerate(PATCHES)))
+    warned = harness.succeed("reconstruct", "TS_01.st", "--aln", "TS_01.aln", "--thickness",
+                             THICKNESS, "-o", "out.mrc", *FIT, cwd=folder)
+    assert "'TS_01.aln' moves parts of the views by up to 60 px, 600 Å" in warned.stderr, warned.stderr
+    assert "is it the one of this series?" in warned.stderr, warned.stderr
 
 
 @pytest.mark.parametrize("row", ("0 0 1 2 3", "99 0 1 2 0.1 0.2 1.0", "0 0 1 2 x 0.2 1.0"))

@@ -166,16 +166,26 @@ def test_particles_at_the_border_are_cut_and_counted(folder):
 
 def test_only_the_particles_of_the_tomogram_are_taken(folder):
     particles = write_particles(folder, names=["TS_02", "TS_01", "TS_03", "TS_01"])
-    cut_out(folder, "--particles", particles, "--box", 11)
+    ended = cut_out(folder, "--particles", particles, "--box", 11)
+    assert "2 of the 4 particles of" in ended.stderr and "'TS_01'; the others" in ended.stderr, ended
     values, _, rows = read_cut(folder)
     assert len(values) == 2 and {row["rlnTomoName"] for row in rows["particles"]} == {"TS_01"}
-    cut_out(folder, "--particles", particles, "--box", 11, "--tomogram", "TS_03")
-    assert len(read_cut(folder)[0]) == 1
+    ended = cut_out(folder, "--particles", particles, "--box", 11, "--tomogram", "TS_03")
+    assert len(read_cut(folder)[0]) == 1 and ": 1 particle in boxes" in ended.stdout, ended
     refused = cut_out(folder, "--particles", particles, "--box", 11, "--tomogram", "TS_04",
                       run=harness.tomofield)
     assert refused.returncode == 2
     for part in ("3 tomograms", "'TS_01' to 'TS_03'", "'TS_04'", "--tomogram"):
         assert part in refused.stderr, refused.stderr
+
+
+def test_particles_of_one_other_name_are_taken_with_a_warning(folder):
+    ended = cut_out(folder, "--particles", write_particles(folder, names=["TS_07"] * len(PLACES)),
+                    "--box", 11)
+    assert "'TS_07', and the model is called 'TS_01'" in ended.stderr, ended
+    assert len(read_cut(folder)[0]) == len(PLACES)
+    ended = cut_out(folder, "--particles", write_particles(folder), "--box", 11)
+    assert "warning" not in ended.stderr and "left out" not in ended.stderr, ended
 
 
 def test_lists_that_make_no_sense_are_refused(folder):

@@ -108,6 +108,8 @@ def test_export_writes_what_the_command_writes(series, made, tmp_path):
         tomofield.export(model, tmp_path / "all.mrc")
     with pytest.raises(tomofield.Error, match="outside of the model"):
         tomofield.export(model, tmp_path / "far.mrc", box=tomofield.Box((900, 0, 0), (2, 2, 2)))
+    tomofield.export(model, tmp_path / "store.mrc", zarr=True, zarr_version="0.5")
+    assert (tmp_path / "store.zarr" / "zarr.json").is_file()  # of Zarr v3 alone
     with pytest.raises(tomofield.Error, match="leave voxel_size_A out"):
         tomofield.export(model, tmp_path / "x.mrc", box=tomofield.Box((9, 9, 9), (2, 2, 2)),
                          voxel_size_A=5)
@@ -122,6 +124,7 @@ def test_baselines_are_those_of_the_command(series, options, method, tmp_path):
     np.testing.assert_array_equal(made.tomogram.values, mrcfile.read(tmp_path / "b.mrc"))
     written = tomofield.read_record(tmp_path / "b.mrc")
     assert made.options["method"] == written.options["method"]
+    assert repr(made) == f"<Reconstruction: {made.tomogram}>"
     assert made.model is None and made.verdict == "" and made.metrics["size_px"] == [32, 32, 16]
     assert steps[-1].fraction_done == 1
     in_memory = {key: value for key, value in options.items() if key != "tlt"}
@@ -162,6 +165,9 @@ def test_denoise_fits_again_without_trials(series, made):
     with pytest.raises(tomofield.Error, match="only a finished result"):
         tomofield.denoise(tomofield.baseline(series.views, "wbp", series.tilt_deg, thickness=16,
                                              pixel_size_A=10), "light")
+    for wrong in (made.tomogram, "tomogram.mrc", None):
+        with pytest.raises(tomofield.Error, match="only a finished result"):
+            tomofield.denoise(wrong, "light")
 
 
 def test_voxel_sizes_come_from_tomograms_or_are_asked_for(made, series):
@@ -170,3 +176,11 @@ def test_voxel_sizes_come_from_tomograms_or_are_asked_for(made, series):
             == pytest.approx(1 / 20))
     with pytest.raises(tomofield.Error, match="give voxel_size_A"):
         tomofield.correlate_shells(series.truth, series.truth)
+
+
+@pytest.mark.parametrize("values, size, said", (
+    (np.ones((3, 4)), 10.0, "and these have 2 dimensions"), (None, 10.0, "have 0 dimensions"),
+    (np.ones((2, 3, 4)), -1.0, "a side of -1.0 Å"), (np.ones((2, 3, 4)), np.nan, "a side of nan Å")))
+def test_a_tomogram_is_a_volume_with_a_size(values, size, said):
+    with pytest.raises(tomofield.Error, match=said):
+        tomofield.Tomogram(values, size)

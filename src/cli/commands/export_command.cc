@@ -231,9 +231,9 @@ void export_particles(const ExportArguments& arguments, const Model& model) {
   const std::size_t num_cut = exchange::write_particles(
       model, std::move(list), boxes, arguments.choices.options.volume, arguments.output);
   results.commit();
-  print("{}: {} particles in boxes of {}³ voxels of {:.6g} Å; their list is {}\n",
-        arguments.output.string(), count, boxes.size, boxes.voxel_px * model.pixel_size_A,
-        exchange::particle_star(arguments.output).string());
+  print("{}: {} particle{} in boxes of {}³ voxels of {:.6g} Å; the list is {}\n",
+        arguments.output.string(), count, count == 1 ? "" : "s", boxes.size,
+        boxes.voxel_px * model.pixel_size_A, exchange::particle_star(arguments.output).string());
   if (num_cut == 0) return;
   print(
       "{} of the {} boxes reach outside the region that was reconstructed: what lies there is a "

@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "base/log.h"
 #include "base/plausible.h"
 #include "io/tables/fiducial_points.h"
 #include "output/volume_frame.h"
@@ -42,6 +43,21 @@ double unbinned_pixel_A(const output::ModelInfo& model) {
 
 // ------------------------------------------------------------------ RELION
 
+/// Says whose particles are taken, where the list does not only name the tomogram that is wanted.
+void tell_choice(const fs::path& path, std::size_t num_rows, std::size_t num_taken,
+                 const std::string& only, const std::string& wanted) {
+  if (num_taken < num_rows) {
+    base::log_info(
+        fmt::format("{} of the {} particles of '{}' are of '{}'; the others are left out",
+                    num_taken, num_rows, path.string(), wanted));
+  } else if (!only.empty() && only != wanted) {
+    base::log_warning(
+        fmt::format("all particles of '{}' are of '{}', and the model is called '{}': they are "
+                    "taken for its own",
+                    path.string(), only, wanted));
+  }
+}
+
 /// Returns the rows of the tomogram.
 std::vector<std::size_t> rows_of_tomogram(const fs::path& path, const io::StarTable& table,
                                           const fs::path& model_file, const std::string& tomogram) {
@@ -53,7 +69,10 @@ std::vector<std::size_t> rows_of_tomogram(const fs::path& path, const io::StarTa
   const std::string wanted = tomogram.empty() ? model_file.stem().string() : tomogram;
   for (std::size_t row = 0; row < table.num_rows(); ++row)
     if (is_only || table.find(row, kTomogramName).value_or("") == wanted) rows.push_back(row);
-  if (!rows.empty()) return rows;
+  if (!rows.empty()) {
+    tell_choice(path, table.num_rows(), rows.size(), *names.begin(), wanted);
+    return rows;
+  }
   if (names.empty()) throw Error(fmt::format("'{}' has no particles", path.string()));
   std::string first = "'" + *names.begin() + "'";
   if (names.size() > 1) first += fmt::format(" to '{}'", *names.rbegin());

@@ -13,6 +13,9 @@ namespace {
 // Pixel sizes that differ by less are the same but for a calibration.
 constexpr double kSamePixel = 0.05;
 
+// No part of a specimen moves so far from where the alignment of its views finds it.
+constexpr double kLargestMotion_A = 500.0;
+
 // A series that is aligned is opened several times, and says this once.
 void warn_of_what_is_left_out(const TiltSeriesOptions& options,
                               const std::optional<SectionTable>& table) {
@@ -28,7 +31,8 @@ void warn_of_what_is_left_out(const TiltSeriesOptions& options,
 FileMotion::FileMotion(const TiltSeriesOptions& options, const io::ImageStack& stack,
                        const std::optional<SectionTable>& table, double pixel_size_A,
                        const std::array<std::int64_t, 2>& aligned_size)
-    : width_px_(static_cast<double>(aligned_size[0])),
+    : pixel_size_A_(pixel_size_A),
+      width_px_(static_cast<double>(aligned_size[0])),
       height_px_(static_cast<double>(aligned_size[1])),
       raw_width_px_(static_cast<double>(stack.header().nx)),
       raw_height_px_(static_cast<double>(stack.header().ny)) {
@@ -71,6 +75,7 @@ std::optional<geometry::ViewWarp> FileMotion::of(View& view) {
   squares_px2_ += fitted.rms_px * fitted.rms_px;
   left_over_px2_ += fitted.left_over_px * fitted.left_over_px;
   largest_px_ = std::max(largest_px_, fitted.warp.largest_component());
+  largest_stated_px_ = std::max(largest_stated_px_, fitted.largest_stated_px);
   return fitted.warp;
 }
 
@@ -81,6 +86,12 @@ void FileMotion::report() const {
       "spline through 5 × 5 places leaves out {:.2f} px",
       source_, num_views_, std::sqrt(squares_px2_ / num_views_), largest_px_,
       std::sqrt(left_over_px2_ / num_views_)));
+  const double largest_A = largest_stated_px_ * pixel_size_A_;
+  if (largest_A <= kLargestMotion_A) return;
+  base::log_warning(
+      fmt::format("the local alignment of '{}' moves parts of the views by up to {:.0f} px, "
+                  "{:.0f} Å, which no specimen does: is it the one of this series?",
+                  source_, largest_stated_px_, largest_A));
 }
 
 }  // namespace tomofield::tilt_series

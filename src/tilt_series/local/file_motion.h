@@ -37,9 +37,10 @@ class FileMotion {
   std::optional<io::ImodLocal> imod_;
   const SectionTable* aretomo_ = nullptr;
   double scale_ = 1.0;  // pixels of the views for each of the IMOD file's
-  double width_px_, height_px_, raw_width_px_, raw_height_px_;
+  double pixel_size_A_, width_px_, height_px_, raw_width_px_, raw_height_px_;
   int num_views_ = 0;
-  double squares_px2_ = 0.0, left_over_px2_ = 0.0, largest_px_ = 0.0;
+  double squares_px2_ = 0.0, left_over_px2_ = 0.0;
+  double largest_px_ = 0.0, largest_stated_px_ = 0.0;
 };
 
 }  // namespace tomofield::tilt_series

@@ -74,6 +74,9 @@ FittedWarp warp_through(double width_px, double height_px, const LocalPlace& pla
       const double y = ((row + 0.5) / kPlaces - 0.5) * height_px;
       const Vector wanted = displacement(x, y), found = fitted.warp.displacement(x, y);
       squares += std::pow(wanted[0] - found[0], 2) + std::pow(wanted[1] - found[1], 2);
+      const Vector stated = place(x, y);
+      fitted.largest_stated_px =
+          std::max(fitted.largest_stated_px, std::hypot(stated[0] - x, stated[1] - y));
     }
   }
   fitted.rms_px = std::sqrt(fitted.warp.mean_square());

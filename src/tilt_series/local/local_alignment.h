@@ -20,6 +20,7 @@ struct FittedWarp {
   geometry::ViewWarp warp;
   double rms_px = 0.0;        ///< of the displacements over the view
   double left_over_px = 0.0;  ///< root mean square of their difference from the other program's
+  double largest_stated_px = 0.0;  ///< distance between an aligned place and its raw one
 };
 
 /// Returns the warp whose nodes have the displacements that a local alignment gives them.
