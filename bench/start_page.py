@@ -6,6 +6,8 @@ import re
 import shlex
 import shutil
 import subprocess
+import sys
+import tempfile
 
 import readme_page
 import start_folders
@@ -32,11 +34,22 @@ def pictures(text=None):
 
 
 def photograph(page, picture):
-    """Draws the beginning of an HTML page as Chromium shows it."""
-    subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
-                    "--window-size=1000,1250", "--virtual-time-budget=4000",
-                    f"--screenshot={picture}", f"file://{os.path.abspath(page)}"],
-                   check=True, capture_output=True)
+    """Draws the beginning of a report as Chromium shows it, once its planes are unpacked."""
+    sys.path.append(os.path.join(readme_page.PROJECT, "tests", "program"))
+    import browser
+    with tempfile.TemporaryDirectory() as profile:
+        window = browser.open_browser(profile)
+        try:
+            window.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                                   {"width": 1000, "height": 1250, "deviceScaleFactor": 1,
+                                    "mobile": False})
+            window.get(f"file://{os.path.abspath(page)}")
+            browser.wait_until(lambda: window.execute_script(
+                "return document.getElementById('volume').dataset.ready") == "yes",
+                               "the planes are shown")
+            window.save_screenshot(picture)
+        finally:
+            window.quit()
 
 
 def make(program, folder):
