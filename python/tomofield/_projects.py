@@ -53,7 +53,7 @@ class Project:
     def __getattr__(self, name: str) -> Any:
         """Return the value of an option, or None if nobody chose it."""
         if name.startswith("_") or name not in {"stack", *Options.__annotations__}:
-            raise AttributeError(f"there is no option '{name}'")
+            raise AttributeError(_no_option(name))
         return getattr(self._core, name)
 
     def __repr__(self) -> str:
@@ -82,7 +82,7 @@ def chosen(choices: _core.Choices, given: Mapping[str, object]) -> _core.Choices
     """Set options among compiled choices, and return these."""
     for name, value in given.items():
         if name not in Options.__annotations__:
-            raise TypeError(f"there is no option '{name}'" + _alternative(name))
+            raise TypeError(_no_option(name))
         try:
             setattr(choices, name, value)
         except TypeError:
@@ -90,7 +90,7 @@ def chosen(choices: _core.Choices, given: Mapping[str, object]) -> _core.Choices
     return choices
 
 
-def _alternative(name: str) -> str:
-    """Return a question with the option whose name is most like this one, if there is one."""
-    alike = difflib.get_close_matches(name, Options.__annotations__, n=1)
-    return f": do you mean '{alike[0]}'?" if alike else ""
+def _no_option(name: str) -> str:
+    """Return a sentence with the option whose name is most like this one, if there is one."""
+    nearest = difflib.get_close_matches(name, Options.__annotations__, n=1)
+    return f"there is no option '{name}'" + "".join(f" (did you mean {it}?)" for it in nearest)

@@ -63,11 +63,11 @@ def test_a_project_says_what_its_files_set(folder):
     assert settings["--thickness"].entry == "THICKNESS"
     assert project.thickness == 16 and project.tilt_offset_deg == 0.5
     assert project.stack == folder / "TS_01.st" and project.epochs is None
-    with pytest.raises(AttributeError, match="epochz"):
+    with pytest.raises(AttributeError, match=r"epochz' \(did you mean epochs\?\)"):
         project.epochz
     project.thickness = 12  # goes over what the files say
     assert project.thickness == 12
-    with pytest.raises(TypeError, match="no option 'thicknes'"):
+    with pytest.raises(TypeError, match=r"no option 'thicknes' \(did you mean thickness\?\)"):
         project.thicknes = 12
 
 
