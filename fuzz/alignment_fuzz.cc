@@ -5,7 +5,7 @@
 #include "fuzz_input.h"
 #include "io/json.h"
 #include "options/run_options.h"
-#include "realign/alignment_origin.h"
+#include "realign/alignment_origin_record.h"
 #include "report/alignment_plot.h"
 
 // The record of an alignment, from which a run resumes, and what the run makes of it. What is

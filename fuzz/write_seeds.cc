@@ -89,7 +89,8 @@ const std::string kRequest =
     "GET /k/plane?volume=0&center=1%2C2,3&right=1,0,0&up=0,1,0&width=4&height=3&step=0.5 "
     "HTTP/1.1\r\nHost: 127.0.0.1:80\r\nConnection: close";
 const std::string kPlan =
-    R"({"threads":2,"memory_bytes":1300,"memory_bytes_of_one_thread":1000,"core_seconds":1.5,)"
+    R"({"stack":"a.mrc","views":3,"view_size_px":[4,4],"pixel_size_A":10,"parameters":9,"steps":4,)"
+    R"("threads":2,"memory_bytes":1300,"memory_bytes_of_one_thread":1000,"core_seconds":1.5,)"
     R"("sample_steps":5,"result_bytes":7,"disk_bytes":9,"trials":6,"open_variation":true,)"
     R"("open_spike_rank":false,"open_prior":true,"inputs":["a.mrc"],"results":["o/a.mrc"]})";
 const std::string kJobs =
@@ -200,7 +201,6 @@ void write_trials(const fs::path& folder, const fs::path& batch) {
   const nlohmann::json trial = tune::to_json(tune::FitTrial{settings, score, 2.5});
   write(folder / "file", nlohmann::json{{"fingerprint", "{}"}, {"trials", {trial, trial}}}.dump());
   const nlohmann::json chosen = settings_json(settings);
-  write(batch / "vote", nlohmann::json{{"chosen", chosen}}.dump());
   nlohmann::json choice = chosen, vote = chosen;
   vote["series"] = "a";
   choice["votes"] = {vote, {{"series", "b"}, {"failure", "no memory"}}};
@@ -208,6 +208,7 @@ void write_trials(const fs::path& folder, const fs::path& batch) {
   const TunedFit tuned{
       .settings = settings, .trials = {{settings, score, 2.5}}, .predicted_views = {3, 9}};
   write(folder / "tuning", tuning_json(tuned).dump());
+  write(batch / "vote", tuning_json(tuned).dump());
 }
 
 // Writes two records of an alignment: a plain one, and one with beads, a pose and local motion.

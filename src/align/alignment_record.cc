@@ -343,4 +343,12 @@ AlignmentRecord record_from(const json& object) {
   return record;
 }
 
+void write_record(const std::filesystem::path& file, const AlignmentRecord& record) {
+  io::write_json(file, to_json(record));
+}
+
+AlignmentRecord read_record(const std::filesystem::path& file) {
+  return io::read_record(file, record_from, [](const std::string& why) { return why; });
+}
+
 }  // namespace tomofield::alignment

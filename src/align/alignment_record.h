@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -92,5 +93,10 @@ nlohmann::json to_json(const AlignmentRecord& record);
 /// Reads a record that somebody may have changed. Throws Error with what is wrong if no alignment
 /// could have written it. What is read is what was written, to the bit.
 AlignmentRecord record_from(const nlohmann::json& json);
+
+/// Writes and reads the file of a record, NAME_align.json. The reader throws Error as record_from()
+/// does, without the name of the file.
+void write_record(const std::filesystem::path& file, const AlignmentRecord& record);
+AlignmentRecord read_record(const std::filesystem::path& file);
 
 }  // namespace tomofield::alignment

@@ -4,7 +4,6 @@
 #include "api/public_call.h"
 #include "baseline/method.h"
 #include "baseline/run_baseline.h"
-#include "io/json.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/baseline.h"
 #include "tomofield/error.h"

@@ -5,7 +5,6 @@
 #include "base/log.h"
 #include "base/threads/parallel.h"
 #include "io/images/image_stack.h"
-#include "io/json.h"
 #include "options/run_options.h"
 #include "output/public_model.h"
 #include "reconstruct/reconstruct.h"
@@ -62,7 +61,7 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
   Reconstruction made{.is_finished = true,
                       .tomogram = {},
                       .model = {},
-                      .metrics = io::json_text(record::to_json(run.record)),
+                      .metrics = record::text_of(run.record),
                       .options = std::move(run.options)};
   if (options.run.output.empty())
     made.tomogram = output::sample_tomogram(*run.model, options.volume.invert);

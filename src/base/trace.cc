@@ -5,9 +5,9 @@
 #include <chrono>
 #include <fstream>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <vector>
 
+#include "base/trace_record.h"
 #include "tomofield/error.h"
 
 namespace tomofield::base {
@@ -15,21 +15,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::int64_t kNone = -1;
-
-struct Event {
-  enum class Kind { kSpan, kLoop, kTask } kind;
-  const char* name;
-  std::int64_t begin, end;  // nanoseconds
-  std::int64_t processor;   // nanoseconds that the thread ran
-  int thread = 0;
-  std::int64_t loop = kNone, task = kNone, outer_task = kNone, index = 0, count = 0;
-  std::int64_t busy = 0, longest = 0;
-};
+constexpr std::int64_t kNone = TraceEvent::kNone;
 
 struct Record {
   std::mutex mutex;
-  std::vector<Event> events;
+  std::vector<TraceEvent> events;
   Clock::time_point start = Clock::now();
   std::atomic<std::int64_t> next_id = 0;
   std::atomic<bool> has_tasks = false;
@@ -56,7 +46,7 @@ std::int64_t processor_now() {
   return std::int64_t{1000000000} * time.tv_sec + time.tv_nsec;
 }
 
-void add(const Event& event) {
+void add(const TraceEvent& event) {
   const std::lock_guard lock(record().mutex);
   record().events.push_back(event);
 }
@@ -64,28 +54,6 @@ void add(const Event& event) {
 void raise(std::atomic<std::int64_t>& largest, std::int64_t value) {
   for (std::int64_t known = largest; known < value && !largest.compare_exchange_weak(known, value);)
     continue;
-}
-
-nlohmann::json json_of(const Event& e) {
-  constexpr const char* kCategories[] = {"span", "loop", "task"};
-  nlohmann::json args = nlohmann::json::object();
-  if (e.kind != Event::Kind::kSpan) args["loop"] = e.loop;
-  if (e.kind == Event::Kind::kTask) args.update({{"task", e.task}, {"index", e.index}});
-  if (e.kind == Event::Kind::kLoop) {
-    args.update({{"in_task", e.outer_task},
-                 {"tasks", e.count},
-                 {"busy_s", 1e-9 * static_cast<double>(e.busy)},
-                 {"longest_s", 1e-9 * static_cast<double>(e.longest)}});
-  }
-  return {{"name", e.name},
-          {"cat", kCategories[static_cast<int>(e.kind)]},
-          {"ph", "X"},
-          {"pid", 1},
-          {"tid", e.thread},
-          {"ts", 1e-3 * static_cast<double>(e.begin)},
-          {"dur", 1e-3 * static_cast<double>(e.end - e.begin)},
-          {"tdur", 1e-3 * static_cast<double>(e.processor)},
-          {"args", args}};
 }
 
 }  // namespace
@@ -102,8 +70,8 @@ void trace::write(const std::filesystem::path& path) {
   const std::lock_guard lock(record().mutex);
   file << "{\"traceEvents\":[\n";
   const char* separator = "";
-  for (const Event& event : record().events) {
-    file << separator << json_of(event);
+  for (const TraceEvent& event : record().events) {
+    file << separator << text_of(event);
     separator = ",\n";
   }
   file << "\n]}\n";
@@ -116,7 +84,7 @@ TraceSpan::TraceSpan(const char* name) : name_(name), begin_(trace::is_on ? now(
 
 TraceSpan::~TraceSpan() {
   if (begin_ == kNone) return;
-  add({.kind = Event::Kind::kSpan,
+  add({.kind = TraceEvent::Kind::kSpan,
        .name = name_,
        .begin = begin_,
        .end = now(),
@@ -145,7 +113,7 @@ TraceLoop::TraceLoop(const char* name, std::int64_t count)
 
 TraceLoop::~TraceLoop() {
   if (id_ < 0) return;
-  add({.kind = Event::Kind::kLoop,
+  add({.kind = TraceEvent::Kind::kLoop,
        .name = name_,
        .begin = begin_,
        .end = now(),
@@ -179,7 +147,7 @@ TraceLoop::Task::~Task() {
   loop.busy_ += end - begin;
   raise(loop.longest_, end - begin);
   if (!loop.has_tasks_) return;
-  add({.kind = Event::Kind::kTask,
+  add({.kind = TraceEvent::Kind::kTask,
        .name = loop.name_,
        .begin = begin,
        .end = end,

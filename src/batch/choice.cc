@@ -5,21 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
+#include <iterator>
+#include <map>
 
-#include "base/plausible.h"
-#include "batch/begun_settings.h"
-#include "io/json.h"
-#include "kernels/spikes.h"
-#include "tomofield/error.h"
+#include "batch/slurm.h"
 
 namespace tomofield::batch {
 namespace {
 
-using nlohmann::json;
 namespace fs = std::filesystem;
-
-bool has_vote(const Vote& vote) { return vote.failure.empty(); }
 
 bool takes_choice(const Job& job) { return !job.is_skipped && job.needs.open_variation; }
 
@@ -27,7 +21,7 @@ bool takes_choice(const Job& job) { return !job.is_skipped && job.needs.open_var
 std::vector<Vote> majority(const std::vector<Vote>& votes) {
   std::vector<Vote> smooth, concave;
   for (const Vote& vote : votes)
-    if (has_vote(vote))
+    if (vote.is_valid())
       (vote.settings.penalty == Penalty::kSmooth ? smooth : concave).push_back(vote);
   return concave.size() > smooth.size() ? concave : smooth;
 }
@@ -68,53 +62,6 @@ std::string settings_text(const SharedSettings& settings) {
                      settings.prior == Prior::kLearned ? ", learned prior" : "");
 }
 
-json settings_json(const SharedSettings& settings) {
-  return {{"tv_penalty", base::name_of(settings.penalty)},
-          {"tv", settings.variation},
-          {"spike_rank", settings.spike_rank ? json(*settings.spike_rank) : json(nullptr)},
-          {"prior", settings.prior ? json(base::name_of(*settings.prior)) : json(nullptr)}};
-}
-
-json vote_json(const Vote& vote) {
-  json entry = has_vote(vote) ? settings_json(vote.settings) : json{{"failure", vote.failure}};
-  entry["series"] = vote.series;
-  return entry;
-}
-
-SharedSettings settings_from(const json& entry) {
-  SharedSettings settings;
-  const auto penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>());
-  if (!penalty) throw Error("'tv_penalty' is neither smooth nor concave");
-  settings.penalty = *penalty;
-  settings.variation = io::number_at(entry, "tv", 0, base::kLargestNumber);
-  if (!entry.at("spike_rank").is_null())
-    settings.spike_rank =
-        static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank));
-  if (!entry.at("prior").is_null()) {
-    settings.prior = base::enum_named<Prior>(entry.at("prior").get<std::string>());
-    if (!settings.prior) throw Error("'prior' is neither tv nor learned");
-  }
-  return settings;
-}
-
-Vote vote_from(const json& entry) {
-  Vote vote;
-  vote.series = entry.at("series").get<std::string>();
-  if (entry.contains("failure"))
-    vote.failure = entry.at("failure").get<std::string>();
-  else
-    vote.settings = settings_from(entry);
-  return vote;
-}
-
-Choice choice_from(const json& document) {
-  Choice choice{.settings = settings_from(document), .votes = {}};
-  for (const json& vote : document.at("votes")) choice.votes.push_back(vote_from(vote));
-  if (std::ranges::none_of(choice.votes, has_vote))
-    throw Error("no series under 'votes' has chosen anything");
-  return choice;
-}
-
 // Adds the words that give shared settings to a job.
 void give_words(const std::vector<std::string>& words, const fs::path& folder, Job& job) {
   if (words.empty()) return;
@@ -131,6 +78,25 @@ std::vector<std::string> settings_words(const SharedSettings& settings, const Ne
   if (needs.open_prior && settings.prior)
     words.push_back(fmt::format("--prior={}", base::name_of(*settings.prior)));
   return words;
+}
+
+// Returns the words of a command that give settings which the series of a batch share.
+std::vector<std::string> shared_words(const std::vector<std::string>& command) {
+  std::vector<std::string> words;
+  std::ranges::copy_if(command, std::back_inserter(words), [](const std::string& word) {
+    return is_shared(std::string_view(word).substr(0, word.find('=')));
+  });
+  return words;
+}
+
+// Returns these words of each series that the list of an earlier batch in this folder has, by its
+// name; without such a list none.
+std::map<std::string, std::vector<std::string>> begun_settings(const fs::path& folder) {
+  std::map<std::string, std::vector<std::string>> settings;
+  const fs::path file = list_of(folder);
+  if (!fs::exists(file)) return settings;
+  for (const auto& [name, command] : read_commands(file)) settings[name] = shared_words(command);
+  return settings;
 }
 
 // Lets the jobs that have begun go on with the settings that they began with. Without an entry in
@@ -156,16 +122,11 @@ std::vector<std::size_t> keep_begun_settings(const fs::path& folder,
   return differing;
 }
 
-// Reads a file of a choice. Mistakes in it are errors that name it.
-template <typename Read>
-auto read_choice_file(const fs::path& file, const char* what, const Read& read) {
-  return io::read_record(file, read, [&](const std::string& why) {
-    return fmt::format("'{}' is not {} ({}): remove it, and the batch chooses again", file.string(),
-                       what, why);
-  });
-}
-
 }  // namespace
+
+bool is_shared(std::string_view flag) {
+  return flag == "--tv" || flag == "--tv-penalty" || flag == "--spike-rank" || flag == "--prior";
+}
 
 ChoicePlan plan_choice(const fs::path& folder, bool continues, std::vector<Job>& jobs) {
   if (continues) {
@@ -204,42 +165,27 @@ std::string describe(const Choice& choice) {
   for (const Vote& vote : choice.votes)
     votes.push_back(fmt::format(
         "{} ({})", vote.series,
-        has_vote(vote) ? settings_text(vote.settings) : "its trials failed: " + vote.failure));
+        vote.is_valid() ? settings_text(vote.settings) : "its trials failed: " + vote.failure));
   return fmt::format("{}, by the trials of {}", settings_text(choice.settings),
                      fmt::join(votes, ", "));
 }
 
 fs::path choice_file(const fs::path& folder) { return folder / "choice.json"; }
 
-void write_choice(const fs::path& folder, const Choice& choice) {
-  json document = settings_json(choice.settings);
-  document["tomofield"] = TOMOFIELD_VERSION;
-  document["votes"] = json::array();
-  for (const Vote& vote : choice.votes) document["votes"].push_back(vote_json(vote));
-  io::write_json(choice_file(folder), document);
-}
-
-std::optional<Choice> read_choice(const fs::path& folder) {
-  const fs::path file = choice_file(folder);
-  if (!fs::exists(file)) return std::nullopt;
-  return read_choice_file(file, "the choice of a batch", choice_from);
+Vote vote_of(const Job& job, const std::optional<tune::TunedFit>& chosen) {
+  if (!chosen) return {.series = job.name, .settings = {}, .failure = "nothing was left to trials"};
+  const tune::TrialSettings& settings = chosen->settings;
+  Vote vote{.series = job.name,
+            .settings = {.penalty = settings.penalty,
+                         .variation = settings.variation,
+                         .spike_rank = {},
+                         .prior = {}},
+            .failure = {}};
+  if (job.needs.open_spike_rank) vote.settings.spike_rank = settings.spike_rank;
+  if (job.needs.open_prior) vote.settings.prior = settings.prior;
+  return vote;
 }
 
 void forget_choice(const fs::path& folder) { fs::remove(choice_file(folder)); }
-
-Vote read_vote(const Job& job, const fs::path& file) {
-  return read_choice_file(file, "the choice of a run", [&](const json& document) {
-    Vote vote;
-    vote.series = job.name;
-    if (document.is_null()) {
-      vote.failure = "nothing was left to trials";
-      return vote;
-    }
-    vote.settings = settings_from(document.at("chosen"));
-    if (!job.needs.open_spike_rank) vote.settings.spike_rank.reset();
-    if (!job.needs.open_prior) vote.settings.prior.reset();
-    return vote;
-  });
-}
 
 }  // namespace tomofield::batch

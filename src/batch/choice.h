@@ -5,12 +5,14 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "base/enum_names.h"
 #include "batch/job.h"
 #include "tomofield/options.h"
+#include "tune/trial_settings.h"
 
 namespace tomofield::batch {
 
@@ -20,6 +22,9 @@ enum class Choose {
   kOnce,  ///< a few series make trials, and all get the same
   kEach   ///< every series makes trials of its own
 };
+
+/// Returns true for the flags of the settings which the series of a batch share, as "--tv".
+bool is_shared(std::string_view flag);
 
 /// The settings that the series of a batch share.
 struct SharedSettings {
@@ -34,6 +39,8 @@ struct Vote {
   std::string series;
   SharedSettings settings;
   std::string failure;  ///< empty if it has a vote
+
+  bool is_valid() const { return failure.empty(); }
 };
 
 /// The settings that all series of a batch get if they do not state their own.
@@ -49,7 +56,7 @@ struct ChoicePlan {
   std::vector<std::size_t> differing;  ///< jobs that go on with other settings than the stored ones
 };
 /// Plans the choice of a batch. If it `continues` another one, series that have begun go on as they
-/// were: their commands get the settings that the list of that batch (begun_settings.h) has for
+/// were: their commands get the settings that the list of that batch (slurm.h) has for
 /// them, and their `needs` are marked as settled. The others take the choice that is stored, if one
 /// is. Else the first, the middle and the last of the series with trials are to choose, if there
 /// are at least two series to share the choice.
@@ -75,8 +82,8 @@ std::optional<Choice> read_choice(const std::filesystem::path& folder);
 /// Removes a choice of an earlier batch.
 void forget_choice(const std::filesystem::path& folder);
 
-/// Reads what `reconstruct --choice` has written for a job. Throws Error for anything else.
-Vote read_vote(const Job& job, const std::filesystem::path& file);
+/// Returns the vote of a job whose trials chose that. It has none if nothing was left to them.
+Vote vote_of(const Job& job, const std::optional<tune::TunedFit>& chosen);
 
 }  // namespace tomofield::batch
 

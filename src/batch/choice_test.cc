@@ -9,6 +9,7 @@
 #include "batch/slurm.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
+#include "tune/trial_record.h"
 
 namespace tomofield::batch {
 namespace {
@@ -170,20 +171,31 @@ TEST(GiveChoice, AddsWhatASeriesLacks) {
   EXPECT_TRUE(jobs[2].command.empty());
 }
 
-TEST(ReadVote, TakesWhatARunChose) {
+TEST(VoteOf, TakesWhatARunChose) {
   const ScratchDirectory directory;
   Job job;
   job.name = "a";
-  const auto file = directory.write(
-      "a.json",
-      R"({"chosen": {"tv_penalty": "concave", "tv": 14, "spike_rank": 3, "prior": "learned"}})");
-  EXPECT_FALSE(read_vote(job, file).settings.spike_rank.has_value());  // it was given
+  const auto file = directory / "a.json";
+  tune::write_choice(file, tune::TunedFit{.settings = {.penalty = Penalty::kConcave,
+                                                       .variation = 14,
+                                                       .rank = 12,
+                                                       .epochs = 30,
+                                                       .spike_rank = 3,
+                                                       .prior = Prior::kLearned},
+                                          .trials = {},
+                                          .predicted_views = {}});
+  const auto chosen = tune::read_choice(file);
+  EXPECT_FALSE(vote_of(job, chosen).settings.spike_rank.has_value());  // it was given
   job.needs.open_spike_rank = true;
-  EXPECT_EQ(read_vote(job, file).settings.spike_rank, 3);
-  EXPECT_EQ(read_vote(job, file).settings.penalty, Penalty::kConcave);
-  EXPECT_FALSE(read_vote(job, directory.write("b.json", "null")).failure.empty());
+  EXPECT_EQ(vote_of(job, chosen).settings.spike_rank, 3);
+  EXPECT_EQ(vote_of(job, chosen).settings.penalty, Penalty::kConcave);
+  EXPECT_EQ(vote_of(job, chosen).settings.variation, 14);
+  EXPECT_EQ(vote_of(job, chosen).series, "a");
+  EXPECT_TRUE(vote_of(job, chosen).is_valid());
+  tune::write_choice(file, std::nullopt);
+  EXPECT_FALSE(vote_of(job, tune::read_choice(file)).is_valid());
   for (const char* text : {"{}", R"({"chosen": {"tv_penalty": "flat", "tv": 14}})"})
-    EXPECT_THROW(read_vote(job, directory.write("c.json", text)), Error) << text;
+    EXPECT_THROW(tune::read_choice(directory.write("c.json", text)), Error) << text;
 }
 
 TEST(ReadChoice, RefusesADamagedFileAndSaysWhatIsWrongAndWhatToDo) {

@@ -9,7 +9,7 @@
 #include "batch/relion_table.h"
 #include "batch/series_list.h"
 #include "batch/slurm.h"
-#include "batch/state.h"
+#include "batch/state_record.h"
 #include "batch/summary.h"
 #include "io/saving/file_identity.h"
 #include "io/saving/output_files.h"

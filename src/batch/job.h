@@ -2,9 +2,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "record/plan_record.h"
 
 namespace tomofield::batch {
 
@@ -47,23 +50,16 @@ struct JobList {
   bool overwrites = false;  ///< replace what other runs have left
 };
 
-/// The needs and the files of a job.
-struct JobPlan {
-  Needs needs;
-  JobFiles files;
-};
-/// Reads the JSON of --plan. Throws Error for anything else.
-JobPlan read_plan(const std::filesystem::path& file);
-
-/// Returns the stack of the run that this JSON of --plan describes, or an empty text. Throws Error
-/// for anything else.
-std::string read_stack(const std::filesystem::path& file);
+Needs needs_of(const record::PlanRecord& plan);
 
 /// Writes the list of a batch, from which the tasks of a job array read their jobs. Throws Error if
 /// it cannot be written, and for words that are no UTF-8.
 void write_jobs(const std::filesystem::path& file, const JobList& list);
 /// Reads what write_jobs() has written. Throws Error for anything else.
 JobList read_jobs(const std::filesystem::path& file);
+/// Returns the commands of a list that an earlier version may have written, by the names of their
+/// jobs. Throws Error, with what to do, if there are none.
+std::map<std::string, std::vector<std::string>> read_commands(const std::filesystem::path& file);
 
 /// Returns whether the results of a job are there: the tomogram and its metrics.
 bool has_results(const std::filesystem::path& output);

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "batch/state.h"
+#include "batch/state_record.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 
@@ -66,29 +66,22 @@ TEST(Jobs, OfADamagedListAreRefused) {
 }
 
 TEST(Needs, ComeFromThePlanOfARun) {
-  const ScratchDirectory directory;
-  const auto read = [&](const std::string& threads, const std::string& seconds) {
-    return read_plan(directory.write(
-        "plan.json", R"({"threads": )" + threads + R"(, "memory_bytes": 1300,
-                         "memory_bytes_of_one_thread": 1000, "core_seconds": )" +
-                         seconds +
-                         R"(, "sample_steps": 5, "result_bytes": 7, "disk_bytes": 9, "trials": 6,
-                         "open_variation": true, "open_spike_rank": false, "open_prior": true,
-                         "inputs": ["a.mrc"], "results": ["out/a.mrc", "out/a.h5"]})"));
+  const auto needs = [](std::int64_t threads) {
+    return needs_of({.num_trials = 6,
+                     .open_variation = true,
+                     .num_threads = threads,
+                     .memory_bytes = 1300,
+                     .memory_bytes_of_one_thread = 1000,
+                     .core_seconds = 1.5,
+                     .disk_bytes = 9});
   };
-  EXPECT_EQ(read("4", "1.5").files.results,
-            (std::vector<std::filesystem::path>{"out/a.mrc", "out/a.h5"}));
-  EXPECT_EQ(read("4", "1.5").files.inputs, std::vector<std::filesystem::path>{"a.mrc"});
-  EXPECT_EQ(read("4", "1.5").needs.memory_bytes(2), 1100);
-  EXPECT_EQ(read("1", "1.5").needs.memory_bytes(2), 1000);
-  EXPECT_FALSE(read("4", "null").needs.core_seconds.has_value());
-  EXPECT_EQ(read("4", "2").needs.disk_bytes, 9);
-  EXPECT_TRUE(read("4", "2").needs.open_variation);
-  EXPECT_FALSE(read("4", "2").needs.open_spike_rank);
-  EXPECT_EQ(read("4", "2").needs.num_trials, 6);
-  EXPECT_THROW(read("0", "1"), Error);
-  EXPECT_THROW(read("4", "-1"), Error);
-  EXPECT_THROW(read("4", "\"x\""), Error);
+  EXPECT_EQ(needs(4).memory_bytes(2), 1100);
+  EXPECT_EQ(needs(1).memory_bytes(2), 1000);
+  EXPECT_EQ(needs(4).core_seconds, 1.5);
+  EXPECT_EQ(needs(4).disk_bytes, 9);
+  EXPECT_TRUE(needs(4).open_variation);
+  EXPECT_FALSE(needs(4).open_spike_rank);
+  EXPECT_EQ(needs(4).num_trials, 6);
 }
 
 TEST(State, OfAJobIsKeptAndDamageIsForgotten) {

@@ -8,9 +8,9 @@
 #include "base/log.h"
 #include "base/system/child_process.h"
 #include "batch/slurm.h"
-#include "batch/state.h"
+#include "batch/state_record.h"
 #include "batch/summary.h"
-#include "tomofield/error.h"
+#include "tune/trial_record.h"
 
 namespace tomofield::batch {
 namespace {
@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // Lets a job make its trials, and returns its vote.
-Vote vote_of(const RunOptions& options, const Job& job, int threads) {
+Vote let_vote(const RunOptions& options, const Job& job, int threads) {
   const fs::path folder = log_folder(options.folder) / "choice";
   fs::create_directories(folder);
   const fs::path answer = folder / (job.name + ".json"), log = folder / (job.name + ".log");
@@ -28,7 +28,7 @@ Vote vote_of(const RunOptions& options, const Job& job, int threads) {
                  {.resumes = !options.overwrites, .overwrites = options.overwrites});
   command.push_back("--choice=" + answer.string());
   const base::ChildResult result = base::run_child(command, log, options.stop_requested);
-  if (result.exit_status == 0) return read_vote(job, answer);
+  if (result.exit_status == 0) return vote_of(job, tune::read_choice(answer));
   Vote none;
   none.series = job.name;
   none.failure = base::reason_of_failure(result.exit_status, log);
@@ -42,9 +42,9 @@ bool make_choice(const RunOptions& options, const std::vector<std::size_t>& choo
   std::vector<Vote> votes;
   for (const std::size_t i : choosing) {
     base::log_info(fmt::format("{}: makes trials that choose for all series", list.jobs[i].name));
-    votes.push_back(vote_of(options, list.jobs[i], threads));
+    votes.push_back(let_vote(options, list.jobs[i], threads));
     if (options.stop_requested && options.stop_requested()) return false;
-    if (!votes.back().failure.empty())
+    if (!votes.back().is_valid())
       base::log_warning(
           fmt::format("{}: its trials failed: {}", votes.back().series, votes.back().failure));
   }

@@ -42,9 +42,9 @@ std::vector<std::string> plan_command(const PlanOptions& options, const Job& job
   return words;
 }
 
-void add_plan(JobPlan plan, Job& job) {
-  job.needs = plan.needs;
-  job.files = std::move(plan.files);
+void add_plan(const record::PlanRecord& plan, Job& job) {
+  job.needs = needs_of(plan);
+  job.files = {plan.inputs, plan.results};
 }
 
 // The stacks of the series so far. A pattern may name a stack and the alignment or the metadata
@@ -105,8 +105,9 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
         faults.add(
             fmt::format("{}: {}", series.source, base::reason_of_failure(result.exit_status, log)));
       else {
-        add_plan(read_plan(plan), job);
-        stacks.require_new(read_stack(plan), series, faults);
+        const record::PlanRecord planned = record::read_plan(plan);
+        add_plan(planned, job);
+        stacks.require_new(planned.stack, series, faults);
       }
     }
     list.jobs.push_back(std::move(job));

@@ -9,7 +9,7 @@
 #include "base/system/child_process.h"
 #include "batch/job.h"
 #include "batch/packing.h"
-#include "batch/state.h"
+#include "batch/state_record.h"
 
 namespace tomofield::batch {
 

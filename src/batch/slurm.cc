@@ -10,7 +10,7 @@
 #include "base/code_text.h"
 #include "base/system/child_process.h"
 #include "batch/packing.h"
-#include "batch/state.h"
+#include "batch/state_record.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 

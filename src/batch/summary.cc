@@ -16,7 +16,7 @@
 #include "batch/choice.h"
 #include "batch/csv.h"
 #include "batch/relion_table.h"
-#include "batch/state.h"
+#include "batch/state_record.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_lock.h"
 #include "io/saving/output_set.h"
@@ -85,7 +85,7 @@ std::string csv_text(const std::vector<Line>& lines) {
     const Needs& needs = line.job->needs;
     const std::array fields{
         spreadsheet_text(line.job->name),
-        name_of(line.state.progress),
+        std::string(base::name_of(line.state.progress)),
         spreadsheet_text(line.state.reason),
         spreadsheet_text(line.job->output.string()),
         number(costs.wall_seconds, 1),
@@ -140,7 +140,7 @@ std::vector<report::HtmlCell> page_row(const fs::path& folder, const Line& line)
   const bool has_run = costs.wall_seconds > 0;
   return {{.text = line.job->name, .mark = {}},
           shown,
-          {.text = name_of(line.state.progress), .mark = mark_of(line)},
+          {.text = base::name_of(line.state.progress), .mark = mark_of(line)},
           {.text = words_of(line), .mark = "words"},
           {.text = has_run ? base::time_text(costs.wall_seconds) : "", .mark = {}},
           {.text = has_run ? base::time_text(costs.core_seconds) : "", .mark = {}},
@@ -156,7 +156,7 @@ std::string counts_text(const std::vector<Line>& lines) {
   for (const Line& line : lines) ++counts[line.state.progress];
   std::vector<std::string> parts;
   for (const auto& [progress, count] : counts)
-    parts.push_back(fmt::format("{} {}", count, name_of(progress)));
+    parts.push_back(fmt::format("{} {}", count, base::name_of(progress)));
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 

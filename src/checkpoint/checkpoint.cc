@@ -5,33 +5,18 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
-#include <set>
 #include <span>
 #include <utility>
 
 #include "base/range.h"
 #include "base/trace.h"
 #include "distributed/gathered_arrays.h"
-#include "io/json.h"
-#include "option_table/rows.h"
-#include "options/run_options.h"
+#include "options/options_record.h"
 #include "output/model_file.h"
 #include "tomofield/error.h"
-#include "tune/trial_record.h"
 
 namespace tomofield::checkpoint {
 namespace {
-
-// Writes the x-axis tilt, the 2 × 2 matrix and the shift of each view.
-nlohmann::json alignment_json(const geometry::RayGeometry& g) {
-  nlohmann::json views = nlohmann::json::array();
-  for (std::size_t v = 0; v < g.x_tilt_deg.size(); ++v) {
-    const geometry::RawFromAligned& m = g.raw_from_aligned[v];
-    views.push_back({g.x_tilt_deg[v], m.m11, m.m12, m.m21, m.m22, m.shift_x_px, m.shift_y_px});
-  }
-  return views;
-}
 
 // Writes seven numbers for each view, in the order of the members.
 std::vector<double> flatten(const std::vector<measurement::ViewSums>& sums) {
@@ -103,51 +88,6 @@ std::optional<fit::TreeProgress> unflatten_tree(std::span<const std::int64_t> nu
     errors = errors.subspan(kErrors);
   }
   return errors.empty() ? std::optional(std::move(tree)) : std::nullopt;
-}
-
-// Writes the trials without their times, so that a fit gives the same bytes whenever it is made.
-nlohmann::json without_times(const tune::TunedFit& tuned) {
-  nlohmann::json json = tune::tuning_json(tuned);
-  for (const char* key : {"trials", "last_trials"})
-    for (nlohmann::json& trial : json[key]) trial.erase("seconds");
-  return json;
-}
-
-// Returns the name that a user has for an entry of a fingerprint: a flag, or a part of the input.
-std::string name_of(const std::string& key) {
-  // These entries are no options themselves; an option decides each.
-  static const std::map<std::string, std::string> derived{{"field.depth", "field.leaf_size"},
-                                                          {"bin_factor", "input.bin"}};
-  const auto other = derived.find(key);
-  const auto flag = option_table::flag_of(other == derived.end() ? key : other->second);
-  if (!flag.empty()) return std::string(flag);
-  if (key.starts_with("alignment")) return "the alignment of the views";
-  for (const char* of_series : {"rays", "noise_sigma", "unit", "tilt_deg"})
-    if (key.starts_with(of_series)) return "the tilt series or how it is read";
-  return key;
-}
-
-// Names the differences between two fingerprints, as in "--seed, the tilt series or how it is
-// read".
-std::string differences(const std::string& found, const std::string& wanted) {
-  const auto parse = [](const std::string& text) {
-    try {
-      return io::parse_json(text);
-    } catch (const Error&) {
-      return nlohmann::json();
-    }
-  };
-  std::set<std::string> names;
-  for (const nlohmann::json& change : nlohmann::json::diff(parse(found), parse(wanted))) {
-    std::string name = change["path"].get<std::string>();
-    const std::size_t index = name.find_first_of("0123456789");
-    if (index != std::string::npos) name.resize(index);  // the name of an array is enough
-    std::ranges::replace(name, '/', '.');
-    const std::size_t first = name.find_first_not_of('.');
-    if (first == std::string::npos) return "everything";
-    names.insert(name_of(name.substr(first, name.find_last_not_of('.') + 1 - first)));
-  }
-  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 template <typename Map>
@@ -255,19 +195,6 @@ void save(const std::filesystem::path& path, const fit::Fit& fit, const output::
       [&] { output::save_model(path, fit.field(), parameters, info, &state, more); });
 }
 
-nlohmann::json transfers_json(const std::vector<microscope::ViewTransfer>& transfers) {
-  nlohmann::json json = nlohmann::json::array();
-  for (const microscope::ViewTransfer& t : transfers)
-    json.push_back({t.optics.voltage_kV, t.optics.spherical_aberration_mm,
-                    t.optics.amplitude_contrast, t.optics.b_factor_A2, t.defocus.u_A, t.defocus.v_A,
-                    t.defocus.angle_deg, t.defocus.phase_shift_deg, t.slope.at_centre_A,
-                    t.slope.x_A, t.slope.y_A, t.exposure, t.pixel_size_A, t.is_flipped});
-  if (!transfers.empty() && transfers.front().detector)  // that of all views
-    json.push_back(
-        {transfers.front().detector->mtf.frequencies, transfers.front().detector->mtf.values});
-  return json;
-}
-
 }  // namespace
 
 std::vector<std::int64_t> as_numbers(const std::string& text) { return {text.begin(), text.end()}; }
@@ -280,37 +207,15 @@ std::string as_text(const std::vector<std::int64_t>& numbers) {
 output::ModelInfo model_info(const measurement::Measurement& series,
                              const options::ReconstructOptions& options) {
   output::ModelInfo info = output::model_info(series, options.views.contrast);
-  info.options_json = options::options_json(options).dump();
+  info.options_json = options::options_text(options);
   return info;
-}
-
-std::string fingerprint_of(const options::ReconstructOptions& options,
-                           const measurement::Measurement& series,
-                           const distributed::Communicator& processes) {
-  nlohmann::json json = options::options_json(options);
-  json.erase("input");
-  json.erase("volume");
-  for (const char* of_results : {"budget", "tile_rows"})  // they change no stage of the fit
-    json["field"].erase(of_results);
-  json["fit"].erase("split_tilts");  // the views of a half tell it apart
-  json["fit"]["denoise"] =
-      options::denoise_factor(options.fit.denoise);  // "strong" and "2" are one
-  json["tilt_deg"] = series.geometry.tilt_deg;
-  if (series.ray_geometry) json["alignment"] = alignment_json(*series.ray_geometry);
-  json["bin_factor"] = series.bin_factor;
-  json["unit"] = series.unit;
-  json["noise_sigma"] = series.noise_sigma;
-  if (!series.left_out.empty()) json["left_out"] = series.left_out;
-  if (!series.transfers.empty()) json["transfers"] = transfers_json(series.transfers);
-  json["rays"] = fmt::format("{:016x}", series.rays->checksum(processes));
-  return json.dump();
 }
 
 output::TrainingState progress_state(const fit::Fit& fit, const FitOrigin& origin) {
   output::TrainingState state;
   const fit::Progress& progress = fit.progress();
   state.integers["fingerprint"] = as_numbers(origin.fingerprint);
-  if (origin.tuned) state.integers["tuning"] = as_numbers(without_times(*origin.tuned).dump());
+  if (origin.tuned) state.integers["tuning"] = as_numbers(trials_text(*origin.tuned));
   if (origin.tile_rows) state.integers["tile_rows"] = {*origin.tile_rows};
   state.integers["step"] = {progress.step};
   state.doubles["views"] = flatten(progress.views);
@@ -349,15 +254,10 @@ std::optional<tune::TunedFit> stored_choice(const std::filesystem::path& path) {
   const output::TrainingState state = output::load_training(path);
   const auto tuning = state.integers.find("tuning");
   if (tuning == state.integers.end()) return std::nullopt;
-  const auto refuse = [&](const std::string& reason) {
-    return Error(fmt::format("'{}' is damaged: its tuning ({})", path.string(), reason));
-  };
   try {
-    return tune::tuned_from(io::parse_json(as_text(tuning->second)));
-  } catch (const nlohmann::json::exception& error) {
-    throw refuse(io::fault_text(error));
+    return trials_from(as_text(tuning->second));
   } catch (const Error& error) {
-    throw refuse(error.what());
+    throw Error(fmt::format("'{}' is damaged: its tuning ({})", path.string(), error.what()));
   }
 }
 
@@ -384,7 +284,7 @@ void restore_fit(const std::filesystem::path& file, const std::string& fingerpri
   if (found != fingerprint) {
     throw Error(
         fmt::format("'{}' was made from another series or with other options (these differ: {})",
-                    path, differences(found, fingerprint)));
+                    path, different_options(found, fingerprint)));
   }
   const auto require_no_fault = [&](const std::string& fault) {
     if (!fault.empty()) throw Error(fmt::format("'{}' is no state of this fit: {}", path, fault));

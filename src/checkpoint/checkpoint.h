@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "checkpoint/origin_record.h"
 #include "distributed/communicator.h"
 #include "fit/fit.h"
 #include "measurement/measurement.h"
 #include "options/run_options.h"
 #include "output/model_file.h"
-#include "tune/tuning.h"
 
 namespace tomofield::checkpoint {
 
@@ -20,24 +20,9 @@ namespace tomofield::checkpoint {
 output::ModelInfo model_info(const measurement::Measurement& series,
                              const options::ReconstructOptions& options);
 
-/// Returns the fingerprint of a fit (JSON): the options, the geometry and a checksum of the rays.
-/// Two fits with the same fingerprint give the same bits. All processes that share the rays must
-/// call it and get the same text.
-std::string fingerprint_of(const options::ReconstructOptions& options,
-                           const measurement::Measurement& series,
-                           const distributed::Communicator& processes);
-
 /// Return a text as the numbers that a training state holds, and the reverse.
 std::vector<std::int64_t> as_numbers(const std::string& text);
 std::string as_text(const std::vector<std::int64_t>& numbers);
-
-/// A fit continues only if it has the same origin.
-struct FitOrigin {
-  std::string fingerprint;              ///< fingerprint_of() its series and options
-  std::optional<tune::TunedFit> tuned;  ///< the trials that chose some of its options
-  /// Rows of the tiles that it is fitted by; 0: the whole region. None: without --budget.
-  std::optional<int> tile_rows = {};
-};
 
 /// Returns the progress of a fit in the form of the model file, without the optimiser. A finished
 /// model has this state.

@@ -8,7 +8,6 @@
 
 #include "base/log.h"
 #include "base/trace.h"
-#include "io/json.h"
 #include "output/model_file.h"
 #include "output/output_paths.h"
 #include "tomofield/error.h"
@@ -44,7 +43,7 @@ void FinishedTiles::read() {
   if (text("budget") != options_.field.budget)
     throw Error(fmt::format("'{}' was made with --budget {}: give the same", path, text("budget")));
   try {
-    tiles_ = tiles_from(io::parse_json(text("tiles")), series_.roi.height());
+    tiles_ = tiles_from(text("tiles"), series_.roi.height());
   } catch (const std::exception& error) {
     throw Error(fmt::format("'{}' is damaged: {}", path, error.what()));
   }
@@ -74,7 +73,7 @@ void FinishedTiles::save() const {
                                     .integers = {{"fingerprint", as_numbers(origin_.fingerprint)},
                                                  {"budget", as_numbers(options_.field.budget)},
                                                  {"tile_rows", {origin_.tile_rows.value_or(0)}},
-                                                 {"tiles", as_numbers(to_json(tiles_).dump())}}};
+                                                 {"tiles", as_numbers(text_of(tiles_))}}};
   output::save_coded(path_, *coded_, model_info(series_, options_), &state);
 }
 

@@ -70,7 +70,10 @@ json to_json(const std::vector<FinishedTile>& tiles) {
   return list;
 }
 
-std::vector<FinishedTile> tiles_from(const json& list, std::int64_t num_rows) {
+std::string text_of(const std::vector<FinishedTile>& tiles) { return to_json(tiles).dump(); }
+
+std::vector<FinishedTile> tiles_from(const std::string& text, std::int64_t num_rows) {
+  const json list = io::parse_json(text);
   if (!list.is_array() || list.empty()) throw Error("it has no tiles");
   std::vector<FinishedTile> tiles;
   for (const json& tile : list) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "base/range.h"
@@ -22,9 +23,10 @@ struct FinishedTile {
 };
 
 nlohmann::json to_json(const std::vector<FinishedTile>& tiles);
+std::string text_of(const std::vector<FinishedTile>& tiles);
 
 /// Reads tiles that somebody may have changed. Throws Error unless they lie side by side from row 0
 /// on, and leave rows of a region of `num_rows` for another one.
-std::vector<FinishedTile> tiles_from(const nlohmann::json& json, std::int64_t num_rows);
+std::vector<FinishedTile> tiles_from(const std::string& text, std::int64_t num_rows);
 
 }  // namespace tomofield::checkpoint

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <array>
 
-#include "base/utf8.h"
+#include "compare/comparison_record.h"
 #include "compare/folder.h"
 #include "compare/grid.h"
 #include "compare/pictures.h"
@@ -16,7 +16,6 @@
 #include "evaluate/box.h"
 #include "evaluate/profile.h"
 #include "io/images/mrc.h"
-#include "io/json.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_folder.h"
 #include "io/saving/output_lock.h"
@@ -160,18 +159,18 @@ std::string report_page(const CompareOptions& options, const std::vector<Row>& r
   return page.document();
 }
 
-nlohmann::json comparison_json(const CompareOptions& options, const std::vector<Row>& rows,
-                               const Table& table) {
-  nlohmann::json methods = table_json(table);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    methods[i]["command"] = utf8_texts(rows[i].run.command);
-    methods[i]["volume"] = base::utf8_text(rows[i].volume.string());
+ComparisonRecord record_of(const CompareOptions& options, const std::vector<Row>& rows,
+                           Table table) {
+  ComparisonRecord record{.series = options.files.stack,
+                          .truth = options.truth,
+                          .commands = {},
+                          .volumes = {},
+                          .table = std::move(table)};
+  for (const Row& row : rows) {
+    record.commands.push_back(row.run.command);
+    record.volumes.push_back(row.volume);
   }
-  return {
-      {"tomofield", TOMOFIELD_VERSION},
-      {"series", base::utf8_text(options.files.stack.string())},
-      {"truth", options.truth ? nlohmann::json(base::utf8_text(options.truth->string())) : nullptr},
-      {"methods", methods}};
+  return record;
 }
 
 }  // namespace
@@ -204,7 +203,7 @@ Outcome compare_methods(const CompareOptions& options, const RunHooks& hooks) {
   const Profiles profiles = profiles_of(options, volumes, detail);
   const std::string page = report_page(options, volumes, table, scores, detail, profiles);
   io::OutputSet results;
-  io::write_json(options.folder / "comparison.json", comparison_json(options, volumes, table));
+  write_comparison(options.folder / "comparison.json", record_of(options, volumes, table));
   io::write_text_file(options.folder / "comparison.csv", table_csv(table));
   io::write_text_file(options.folder / "profile.csv",
                       evaluate::profile_csv(profiles.line, profiles.voxel_A, profiles.columns));

@@ -2,11 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "evaluate/volume_pair.h"
 #include "io/images/mrc.h"
-#include "io/json.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {
@@ -24,11 +21,6 @@ Grid read_grid(const std::filesystem::path& mrc) {
   const io::MrcReader file(mrc);
   const io::MrcHeader& header = file.header();
   return {{header.nx, header.ny, header.nz}, header.voxel_size_A[0]};
-}
-
-Grid read_planned_grid(const std::filesystem::path& file) {
-  const nlohmann::json grid = io::read_json(file).at("grid");
-  return {grid.at("size"), grid.at("voxel_A")};
 }
 
 void require_one_grid(const NamedGrid& main, const NamedGrid& other) {

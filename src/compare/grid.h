@@ -1,23 +1,16 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <filesystem>
 #include <string>
 
+#include "record/plan_record.h"
+
 namespace tomofield::compare {
 
-/// The numbers of voxels of a volume along x, y and z of its file, and their size.
-struct Grid {
-  std::array<std::int64_t, 3> size{};
-  double voxel_A = 0;  ///< 0 if not known; some programs write 1 then
-};
+using record::Grid;
 
 /// Reads the grid from the header of an MRC volume.
 Grid read_grid(const std::filesystem::path& mrc);
-
-/// Reads the grid of a volume that is to be made, from what --dry-run --grid FILE writes.
-Grid read_planned_grid(const std::filesystem::path& file);
 
 /// The grid of a volume and the name of its maker.
 struct NamedGrid {

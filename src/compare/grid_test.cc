@@ -14,14 +14,6 @@ namespace {
 using testing::message_of;
 using testing::ScratchDirectory;
 
-TEST(PlannedGrid, IsWhatADryRunWrites) {
-  const ScratchDirectory scratch;
-  const Grid grid = read_planned_grid(
-      scratch.write("grid.json", R"({"grid": {"size": [48, 24, 36], "voxel_A": 13.372}})"));
-  EXPECT_EQ(grid.size, (std::array<std::int64_t, 3>{48, 24, 36}));
-  EXPECT_EQ(grid.voxel_A, 13.372);
-}
-
 TEST(OneGrid, IsRequiredOfAllVolumes) {
   const NamedGrid main{"vm", {{48, 36, 24}, 13.372}};
   EXPECT_NO_THROW(require_one_grid(main, {"tv", {{48, 36, 24}, 13.37}})) << "four digits";

@@ -1,65 +1,18 @@
 #include "compare/rows.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cstdint>
 
 #include "base/log.h"
-#include "base/plausible.h"
-#include "base/utf8.h"
 #include "compare/grid.h"
-#include "io/json.h"
 #include "output/output_paths.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {
 namespace {
 
-using nlohmann::json;
 namespace fs = std::filesystem;
-
-constexpr const char* kAdvice =
-    "give another folder with -o, or --overwrite to make everything in this one again";
-
-std::string not_of_this_comparison(const fs::path& file, const std::string& why) {
-  return fmt::format("'{}' is not what this comparison wrote ({}): {}", file.string(), why,
-                     kAdvice);
-}
-
-std::string command_text(const json& command) {
-  return fmt::format("`tomofield {}`", fmt::join(command.get<std::vector<std::string>>(), " "));
-}
-
-std::vector<std::string> changed_files(const json& before, const json& now) {
-  std::vector<std::string> changes;
-  for (const auto& [path, state] : now.items()) {
-    if (!before.contains(path))
-      changes.push_back(fmt::format("it did not read '{}'", path));
-    else if (before.at(path) != state)
-      changes.push_back(fmt::format("'{}' has changed since", path));
-  }
-  for (const auto& [path, state] : before.items()) {
-    if (!now.contains(path)) changes.push_back(fmt::format("it read '{}'", path));
-  }
-  return changes;
-}
-
-// Returns the differences of two origins, a clause each.
-std::vector<std::string> changes(const json& before, const json& now) {
-  std::vector<std::string> all = changed_files(before.at("files"), now.at("files"));
-  if (before.at("command") != now.at("command")) {
-    all.push_back(fmt::format("its command was {} and now is {}", command_text(before["command"]),
-                              command_text(now.at("command"))));
-  }
-  if (before.at("tomofield") != now.at("tomofield")) {
-    all.push_back(fmt::format("it is of tomofield {}, and this is {}",
-                              before.at("tomofield").get<std::string>(),
-                              now.at("tomofield").get<std::string>()));
-  }
-  return all;
-}
 
 // Returns the files of the run, and those in which the comparison keeps its state and all that it
 // said.
@@ -119,47 +72,6 @@ bool run(const fs::path& program, const RunHooks& hooks, Row& row) {
 }
 
 }  // namespace
-
-std::vector<std::string> utf8_texts(const std::vector<std::string>& words) {
-  std::vector<std::string> texts;
-  for (const std::string& word : words) texts.push_back(base::utf8_text(word));
-  return texts;
-}
-
-json origin_of(const std::vector<std::string>& command, const std::vector<fs::path>& inputs) {
-  json files = json::object();
-  for (const fs::path& path : inputs) {
-    files[base::utf8_text(fs::absolute(path).string())] = {
-        {"bytes", fs::file_size(path)},
-        {"written", fs::last_write_time(path).time_since_epoch().count()}};
-  }
-  return {{"tomofield", TOMOFIELD_VERSION}, {"command", utf8_texts(command)}, {"files", files}};
-}
-
-RowState read_row(const fs::path& file, const json& origin) {
-  if (!fs::exists(file)) return {};
-  std::vector<std::string> differences;
-  const auto read = [&](const json& row) {
-    differences = changes(row.at("origin"), origin);
-    return RowState{row.at("progress"),
-                    {io::number_at(row, "core_seconds", 0, base::kLargestNumber),
-                     io::number_at(row, "wall_seconds", 0, base::kLargestNumber),
-                     io::integer_at(row, "peak_bytes", 0, INT64_MAX)}};
-  };
-  const RowState state = io::read_record(
-      file, read, [&](const std::string& why) { return not_of_this_comparison(file, why); });
-  if (differences.empty()) return state;
-  throw Error(fmt::format("what '{}' tells of cannot be kept: {}: {}", file.string(),
-                          fmt::join(differences, "; "), kAdvice));
-}
-
-void write_row(const fs::path& file, const json& origin, const RowState& state) {
-  io::write_json(file, {{"origin", origin},
-                        {"progress", state.progress},
-                        {"core_seconds", state.costs.core_seconds},
-                        {"wall_seconds", state.costs.wall_seconds},
-                        {"peak_bytes", state.costs.peak_bytes}});
-}
 
 std::vector<Row> new_rows(const std::vector<Run>& runs, const fs::path& folder) {
   std::vector<Row> rows;

@@ -1,47 +1,16 @@
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "base/system/child_process.h"
 #include "compare/methods.h"
+#include "compare/row_record.h"
 #include "record/run_summary_record.h"
 
 namespace tomofield::compare {
-
-/// The progress of a run. A run that is marked as running when nobody runs it was killed; its costs
-/// since its last start are not known.
-enum class Progress { kNone, kRunning, kStopped, kFinished };
-NLOHMANN_JSON_SERIALIZE_ENUM(Progress, {{Progress::kNone, nullptr},
-                                        {Progress::kRunning, "running"},
-                                        {Progress::kStopped, "stopped"},
-                                        {Progress::kFinished, "finished"}})
-
-struct RowState {
-  Progress progress = Progress::kNone;
-  base::Costs costs;  ///< of all sessions
-};
-
-/// Returns words as UTF-8, which JSON needs (base/utf8.h).
-std::vector<std::string> utf8_texts(const std::vector<std::string>& words);
-
-/// Returns what decides a run's results: the version of tomofield, the command, and the path, size
-/// and time of the files that it reads. Size and time tell whether a file has changed without
-/// reading it.
-nlohmann::json origin_of(const std::vector<std::string>& command,
-                         const std::vector<std::filesystem::path>& inputs);
-
-/// Reads the state of a run from `file` (NAME.row.json); returns kNone if there is no such file.
-/// Throws Error, with every difference, if the run has another origin, and for a file that
-/// write_row() did not write.
-RowState read_row(const std::filesystem::path& file, const nlohmann::json& origin);
-void write_row(const std::filesystem::path& file, const nlohmann::json& origin,
-               const RowState& state);
 
 /// A run of a method.
 struct Run {
@@ -56,7 +25,7 @@ struct Run {
 struct Row {
   Run run;
   std::filesystem::path volume;
-  nlohmann::json origin;  ///< origin_of() the run
+  RunOrigin origin;
   RowState state;
   record::RunSummary summary = {};  ///< once it is finished
 };

@@ -96,7 +96,7 @@ std::optional<Grid> grid_to_be(const CompareOptions& options, const RunHooks& ho
   if (hooks.must_stop()) return std::nullopt;
   if (result.exit_status != 0)
     throw Error(fmt::format("{}: {}", row.run.name, base::reason_of_failure(log)));
-  return read_planned_grid(grid);
+  return record::read_planned_grid(grid);
 }
 
 // Throws Error unless the regions and the profile that are given lie in the volumes.

@@ -56,19 +56,6 @@ Table table_of_costs(const std::vector<Row>& rows) {
   return table;
 }
 
-nlohmann::json table_json(const Table& table) {
-  nlohmann::json json = nlohmann::json::array();
-  for (std::size_t row = 0; row < table.methods.size(); ++row) {
-    nlohmann::json entry{{"method", table.methods[row].name}};
-    for (std::size_t c = 0; c < table.columns.size(); ++c) {
-      const auto& value = table.values[row][c];
-      entry[table.columns[c].key] = value ? nlohmann::json(*value) : nlohmann::json(nullptr);
-    }
-    json.push_back(std::move(entry));
-  }
-  return json;
-}
-
 std::string table_csv(const Table& table) {
   std::string csv = "method";
   for (const Column& column : table.columns) csv += "," + column.key;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,7 +36,6 @@ struct Table {
 /// Returns the costs of every method: core-seconds, wall-clock seconds, memory and parameters.
 Table table_of_costs(const std::vector<Row>& rows);
 
-nlohmann::json table_json(const Table& table);
 /// Returns the table as comma-separated text with a head. A missing value is empty.
 std::string table_csv(const Table& table);
 /// Returns the cells with their marks: "best" is the best of its column, "better" is better than

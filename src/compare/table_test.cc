@@ -30,7 +30,6 @@ TEST(ComparisonTable, IsWrittenWithHolesWhereThereIsNoFigure) {
   const Table table = small_table();
   EXPECT_EQ(table_csv(table),
             "method,psnr,seconds,parameters\nmain,24,30,1\nfast,22,3,\nnone,,40,0.5\n");
-  EXPECT_TRUE(table_json(table)[2].at("psnr").is_null());
   const auto cells = table_cells(table);
   EXPECT_EQ(cells[1][1].text, "24.0");
   EXPECT_EQ(cells[1][1].mark, "best");

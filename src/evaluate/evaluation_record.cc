@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "base/utf8.h"
+#include "io/json.h"
 
 namespace tomofield::evaluate {
 namespace {
@@ -21,12 +22,9 @@ json curve_json(const Fsc& fsc, const FscCurve& curve) {
       {"voxels", curve.voxels}};
 }
 
-}  // namespace
-
-json comparison_json(const Comparison& comparison, const std::filesystem::path& reconstruction,
-                     const std::filesystem::path& truth) {
-  return {{"reconstruction", base::utf8_text(reconstruction.string())},
-          {"truth", base::utf8_text(truth.string())},
+json comparison_json(const EvaluationRecord::WithTruth& truth) {
+  const Comparison& comparison = truth.scores;
+  return {{"truth", base::utf8_text(truth.truth.string())},
           {"psnr_raw_dB", comparison.psnr.raw_dB},
           {"psnr_affine_dB", comparison.psnr.affine_dB},
           {"ssim_raw", comparison.ssim.raw},
@@ -38,6 +36,60 @@ json comparison_json(const Comparison& comparison, const std::filesystem::path& 
           {"box_first", comparison.box.begin},
           {"box_last", comparison.box.end}};
 }
+
+json membrane_json(const EvaluationRecord::WithLabel& membranes) {
+  const auto& [score, label] = membranes;
+  return {{"label", base::utf8_text(label.string())},
+          {"best_dice", score.best_dice},
+          {"average_precision", score.average_precision}};
+}
+
+json picks_json(const EvaluationRecord::WithParticles& picks) {
+  json record{{"particles", base::utf8_text(picks.list.string())}};
+  for (const PickScore& score : picks.scores)
+    record["kinds"][score.kind] = {{"particles", score.num_particles},
+                                   {"radius_A", score.radius_A},
+                                   {"average_precision", score.average_precision}};
+  return record;
+}
+
+json reprojection_json(const EvaluationRecord::WithViews& reprojection) {
+  const auto& [score, options] = reprojection;
+  json views = json::array();
+  for (std::size_t v = 0; v < score.errors.views.size(); ++v) {
+    views.push_back({{"view", score.errors.views[v]},
+                     {"tilt_deg", score.tilt_deg[v]},
+                     {"error", score.errors.view_error[v]},
+                     {"noise_sigma", score.unit / std::sqrt(score.errors.models[v].weight)},
+                     {"scale", score.errors.models[v].scale * score.unit},
+                     {"offset", score.errors.models[v].offset * score.unit}});
+  }
+  return {{"series", base::utf8_text(options.input.stack.string())},
+          {"hold_out", options.hold_out},
+          {"error", score.errors.total},
+          {"views", views}};
+}
+
+json contrast_json(const EvaluationRecord::OfRegions& contrast) {
+  const auto& [score, regions, are_chosen] = contrast;
+  const auto boxes = [](const std::vector<base::Box>& all) {
+    json list = json::array();
+    for (const base::Box& box : all) list.push_back(to_text(box));
+    return list;
+  };
+  return {{"cnr", score.cnr},
+          {"enl", score.enl},
+          {"foreground", boxes(regions.foreground)},
+          {"background", boxes(regions.background)},
+          {"foreground_mean", score.foreground_mean},
+          {"foreground_deviation", score.foreground_deviation},
+          {"background_mean", score.background_mean},
+          {"background_deviation", score.background_deviation},
+          {"normalised_from", {score.low, score.high}},
+          {"regions_chosen", are_chosen}};
+}
+
+}  // namespace
 
 json fsc_json(const Fsc& fsc, const FscFiles& files) {
   json record = {{"first", base::utf8_text(files.first.string())},
@@ -57,54 +109,6 @@ json fsc_json(const Fsc& fsc, const FscFiles& files) {
   return record;
 }
 
-json membrane_json(const DetectionScore& score, const std::filesystem::path& label) {
-  return {{"label", base::utf8_text(label.string())},
-          {"best_dice", score.best_dice},
-          {"average_precision", score.average_precision}};
-}
-
-json picks_json(const std::vector<PickScore>& scores, const std::filesystem::path& list) {
-  json record{{"particles", base::utf8_text(list.string())}};
-  for (const PickScore& score : scores)
-    record["kinds"][score.kind] = {{"particles", score.num_particles},
-                                   {"radius_A", score.radius_A},
-                                   {"average_precision", score.average_precision}};
-  return record;
-}
-
-json volume_score_json(const VolumeScore& score, const VolumeScoreOptions& options) {
-  json views = json::array();
-  for (std::size_t v = 0; v < score.errors.views.size(); ++v) {
-    views.push_back({{"view", score.errors.views[v]},
-                     {"tilt_deg", score.tilt_deg[v]},
-                     {"error", score.errors.view_error[v]},
-                     {"noise_sigma", score.unit / std::sqrt(score.errors.models[v].weight)},
-                     {"scale", score.errors.models[v].scale * score.unit},
-                     {"offset", score.errors.models[v].offset * score.unit}});
-  }
-  return {{"series", base::utf8_text(options.input.stack.string())},
-          {"hold_out", options.hold_out},
-          {"error", score.errors.total},
-          {"views", views}};
-}
-
-json contrast_json(const ContrastScore& score, const Regions& regions) {
-  const auto boxes = [](const std::vector<base::Box>& all) {
-    json list = json::array();
-    for (const base::Box& box : all) list.push_back(to_text(box));
-    return list;
-  };
-  return {{"cnr", score.cnr},
-          {"enl", score.enl},
-          {"foreground", boxes(regions.foreground)},
-          {"background", boxes(regions.background)},
-          {"foreground_mean", score.foreground_mean},
-          {"foreground_deviation", score.foreground_deviation},
-          {"background_mean", score.background_mean},
-          {"background_deviation", score.background_deviation},
-          {"normalised_from", {score.low, score.high}}};
-}
-
 json artefacts_json(const std::optional<double>& speckle, const std::optional<FaceJump>& faces) {
   const auto value = [](const std::optional<double>& number) {
     return number ? json(*number) : json(nullptr);
@@ -112,6 +116,19 @@ json artefacts_json(const std::optional<double>& speckle, const std::optional<Fa
   json jump = nullptr;
   if (faces) jump = {{"both", faces->both}, {"x", value(faces->x)}, {"y", value(faces->y)}};
   return {{"speckle", value(speckle)}, {"face_jump", jump}};
+}
+
+void write_record(const std::filesystem::path& file, const EvaluationRecord& record) {
+  json metrics{{"reconstruction", base::utf8_text(record.volume.string())}};
+  if (record.comparison) metrics.update(comparison_json(*record.comparison));
+  if (record.correlation)
+    metrics["fsc"] = fsc_json(record.correlation->fsc, record.correlation->files);
+  if (record.membranes) metrics["membranes"] = membrane_json(*record.membranes);
+  if (record.picks) metrics["picks"] = picks_json(*record.picks);
+  if (record.reprojection) metrics["reprojection"] = reprojection_json(*record.reprojection);
+  if (record.contrast) metrics["contrast"] = contrast_json(*record.contrast);
+  metrics.update(artefacts_json(record.speckle, record.faces));
+  io::write_json(file, metrics);
 }
 
 }  // namespace tomofield::evaluate

@@ -2,9 +2,8 @@
 
 #include "base/trace.h"
 #include "exchange/alignment_output.h"
-#include "exchange/portal_alignment.h"
+#include "exchange/portal_alignment_record.h"
 #include "exchange/relion_output.h"
-#include "io/json.h"
 #include "output/output_paths.h"
 
 namespace tomofield::exchange {
@@ -29,10 +28,7 @@ void write_exchange_files(const tilt_series::PlannedSeries& series,
   const base::TraceSpan span("write files for other programs");
   write_relion_output(options, volume);
   write_alignment_results(series, options);
-  if (options.run.alignment_json) {
-    io::write_json(output::output_paths(options.run.output).portal_alignment,
-                   portal_alignment(series, options, volume));
-  }
+  if (options.run.alignment_json) write_portal_alignment(series, options, volume);
 }
 
 }  // namespace tomofield::exchange

@@ -191,6 +191,17 @@ json json_of(const T& value) {
     return value;
 }
 
+std::string shown(const json& value) {
+  if (value.is_null()) return kNoValue;
+  if (value.is_string()) return value.get_ref<const std::string&>().empty() ? kNoValue : value;
+  if (value.is_boolean()) return value.get<bool>() ? "on" : "off";
+  if (value.is_number_float()) return fmt::format("{:.6g}", value.get<double>());
+  if (!value.is_array()) return value.dump();
+  std::vector<std::string> texts;
+  for (const json& item : value) texts.push_back(shown(item));
+  return fmt::format("{}", fmt::join(texts, ", "));
+}
+
 json::json_pointer pointer_to(std::string_view key) {
   std::string path = fmt::format("/{}", key);
   for (char& c : path)
@@ -260,6 +271,12 @@ std::optional<std::string> text_of(const Row& row, const Choices& choices) {
         }
       });
   return text && text->empty() ? std::nullopt : text;
+}
+
+std::string shown_text(const Row& row, const Choices& choices) {
+  const json value = visit_value(row, choices, [](const auto& member) { return json_of(member); });
+  if (value.is_boolean() && row.flag.starts_with("--no-")) return shown(!value.get<bool>());
+  return shown(value);
 }
 
 std::string flag_text_of(std::string_view flag, const Choices& choices) {

@@ -29,6 +29,13 @@ std::optional<std::string> text_of(const Row& row, const Choices& choices);
 /// Returns the value of a flag as set_flag_from_text() reads it; "none" where nothing is chosen.
 std::string flag_text_of(std::string_view flag, const Choices& choices);
 
+/// Stands for the value of an option that has none.
+inline constexpr const char* kNoValue = "–";
+
+/// Returns the value of an option for people who read what a run was made with: "on" and "off" as
+/// its flag means them (--no-margin is on if the margin is off), numbers with six digits.
+std::string shown_text(const Row& row, const Choices& choices);
+
 /// Returns what stands for the value of an option in the help: "FILE", "dark|bright".
 std::string label_of(const Row& row);
 

@@ -223,24 +223,6 @@ std::vector<std::string> ReconstructOptions::faults_of_job() const {
   return all;
 }
 
-nlohmann::json options_json(const ReconstructOptions& options) {
-  nlohmann::json all = option_table::to_json({options.files, options});
-  all.erase("running");  // says where the results are, not what they are made from
-  constexpr fit::FieldStart kStart;
-  all["field"].update({{"depth", fit::depth_of(options.field)},
-                       {"margin_rank", fit::kMarginRank},
-                       {"sharpness", kStart.sharpness},
-                       {"initial_scale", kStart.initial_scale}});
-  all["fit"].update({{"final_rate", fit::kFinalRate},
-                     {"coarse_final_rate", fit::kCoarseFinalRate},
-                     {"refined_rate", fit::kRefinedRate},
-                     {"vertex_rate", fit::kVertexRate},
-                     {"factorised_rate", fit::kFactorisedRate},
-                     {"concavity", objective::kConcavity},
-                     {"gradient_floor", objective::kGradientFloor}});
-  return all;
-}
-
 double denoise_factor(const std::string& text) {
   for (const DenoisePlace& place : kDenoisePlaces)
     if (text == place.name) return place.factor;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -72,9 +71,6 @@ struct ReconstructOptions : Options {
 /// Resolves the options and hands them to the layers below. Where trials choose an option, it gets
 /// the value that the trials start from. A fit keeps that value if no trials are made.
 ReconstructOptions run_options(const SeriesFiles& files, const Options& requested);
-
-/// Writes the resolved options and the constants of the method for the metrics and the model file.
-nlohmann::json options_json(const ReconstructOptions& options);
 
 /// A strength of `--denoise` that has a name.
 struct DenoisePlace {

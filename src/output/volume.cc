@@ -15,8 +15,8 @@
 #include "io/saving/atomic_folder.h"
 #include "io/saving/output_set.h"
 #include "output/box_bounds.h"
+#include "output/model_input_record.h"
 #include "output/sample_model.h"
-#include "output/volume_labels.h"
 #include "tomofield/error.h"
 
 namespace tomofield::output {

@@ -6,7 +6,6 @@
 
 #include "align/alignment_record.h"
 #include "io/is_file.h"
-#include "io/json.h"
 #include "output/output_paths.h"
 #include "tomofield/error.h"
 
@@ -59,7 +58,7 @@ Levelling found_levelling(const std::filesystem::path& model) {
                     path.string(), model.string(), kAdvice));
   }
   try {
-    const alignment::AlignmentRecord record = alignment::record_from(io::read_json(path));
+    const alignment::AlignmentRecord record = alignment::read_record(path);
     if (!record.pose) throw Error("the views could not tell the pitch");
     const auto& [pose, error] = *record.pose;
     const Levelling found{.pitch_deg = sure_angle(pose.pitch_deg, error.pitch_deg),

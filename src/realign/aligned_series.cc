@@ -15,10 +15,9 @@
 #include "base/log.h"
 #include "base/progress.h"
 #include "base/trace.h"
-#include "io/json.h"
 #include "measurement/prepare.h"
 #include "output/output_paths.h"
-#include "realign/alignment_origin.h"
+#include "realign/alignment_origin_record.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::realign {
@@ -179,8 +178,7 @@ bool align_series(options::ReconstructOptions& options, const tune::TuneHooks& h
       return false;
     }
     processes.run_collectively([&] {
-      if (processes.is_root() && !options.run.output.empty())
-        io::write_json(path, alignment::to_json(record));
+      if (processes.is_root() && !options.run.output.empty()) alignment::write_record(path, record);
     });
   }
   apply_alignment(record, options);

@@ -12,7 +12,6 @@
 #include "evaluate/resolution/block_fsc.h"
 #include "evaluate/resolution/local_resolution.h"
 #include "evaluate/uncertainty.h"
-#include "io/json.h"
 #include "io/saving/output_set.h"
 #include "output/output_paths.h"
 #include "output/volume.h"
@@ -184,7 +183,7 @@ void write_all(const Run& run, const FinishedFits& fits, const std::optional<tun
   if (fits.held_out_view)
     report::write_held_out_picture(*fits.held_out_view, run.paths.held_out_picture);
   results.record.halves = halves_record(run, fits, found);
-  io::write_json(run.paths.json, record::to_json(results.record));
+  record::write_record(run.paths.json, results.record);
   write_pages(run, outputs, results);
   remove_stale_files(run.options, outputs);
   outputs.commit();

@@ -20,9 +20,8 @@
 #include "checkpoint/checkpoint.h"
 #include "compact/budget.h"
 #include "compact/compress.h"
-#include "io/json.h"
 #include "io/saving/output_set.h"
-#include "options/run_options.h"
+#include "options/options_record.h"
 #include "output/metrics_record.h"
 #include "output/output_paths.h"
 #include "output/volume.h"
@@ -113,7 +112,7 @@ void write_results(RunResult& results, const ResultFiles& files) {
   }
   write_all(writers, processes);
   processes.run_collectively([&] {
-    if (processes.is_root()) io::write_json(paths.json, record::to_json(results.record));
+    if (processes.is_root()) record::write_record(paths.json, results.record);
   });
 }
 

@@ -5,6 +5,7 @@
 #include "evaluate/evaluation_record.h"
 #include "evaluate/resolution/local_resolution.h"
 #include "evaluate/uncertainty.h"
+#include "io/json.h"
 #include "tune/trial_record.h"
 #include "verdict/verdict_record.h"
 
@@ -142,13 +143,17 @@ json halves_json(const HalvesRecord& record) {
 
 }  // namespace
 
-json to_json(const RunRecord& record) {
+std::string text_of(const RunRecord& record) {
   json object = {{"tomofield", TOMOFIELD_VERSION},
                  {"options", record.options},
                  {"origins", option_table::settings_json(record.settings)},
                  {"metrics", metrics_json(record)}};
   if (record.halves) object["halves"] = halves_json(*record.halves);
-  return object;
+  return io::json_text(object);
+}
+
+void write_record(const std::filesystem::path& file, const RunRecord& record) {
+  io::write_text_file(file, text_of(record));
 }
 
 }  // namespace tomofield::record

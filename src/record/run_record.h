@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "align/alignment_record.h"
@@ -69,6 +70,8 @@ struct RunRecord {
   std::optional<HalvesRecord> halves = {};
 };
 
-nlohmann::json to_json(const RunRecord& record);
+/// Returns the text of the file, and writes it.
+std::string text_of(const RunRecord& record);
+void write_record(const std::filesystem::path& file, const RunRecord& record);
 
 }  // namespace tomofield::record

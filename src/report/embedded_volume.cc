@@ -112,18 +112,4 @@ EmbeddedVolume embed_volume(const std::filesystem::path& mrc) {
   return volume;
 }
 
-nlohmann::json volume_json(const EmbeddedVolume& volume) {
-  nlohmann::json sheets = nlohmann::json::array();
-  for (const std::string& sheet : volume.sheets) sheets.push_back(base64(sheet));
-  return {{"size", volume.size},
-          {"file_size", volume.file_size},
-          {"voxel_size_A", volume.voxel_size_A},
-          {"limits", volume.limits},
-          {"contrast", volume.contrast},
-          {"tile", volume.tile},
-          {"columns", volume.columns},
-          {"rows", volume.rows},
-          {"sheets", std::move(sheets)}};
-}
-
 }  // namespace tomofield::report

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,7 +31,7 @@ inline constexpr std::size_t kMostSheetBytes = std::size_t{5} << 20;
 /// voxel.
 EmbeddedVolume embed_volume(const std::filesystem::path& mrc);
 
-/// Returns what the script of the page reads (page/report.js). The sheets are base64.
-nlohmann::json volume_json(const EmbeddedVolume& volume);
+/// Returns what the script of the page reads (page/report.js), JSON. The sheets are base64.
+std::string text_of(const EmbeddedVolume& volume);
 
 }  // namespace tomofield::report

@@ -6,6 +6,7 @@
 
 #include "base/random.h"
 #include "io/images/mrc.h"
+#include "io/json.h"
 #include "report/contrast.h"
 #include "scratch_directory.h"
 
@@ -35,7 +36,7 @@ TEST(EmbeddedVolume, HasLimitsBeyondTheContrast) {
   EXPECT_EQ(volume.size, (std::array<std::int64_t, 3>{10, 10, 10}));
   EXPECT_EQ(volume.tile, (std::array<std::int64_t, 2>{16, 16}));  // whole blocks of JPEG
   EXPECT_EQ(volume.sheets.size(), 1u);
-  EXPECT_EQ(volume_json(volume)["sheets"].size(), 1u);
+  EXPECT_EQ(io::parse_json(text_of(volume)).at("sheets").size(), 1u);
 }
 
 TEST(EmbeddedVolume, OfOneValueHasAContrastAllTheSame) {

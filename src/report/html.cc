@@ -119,7 +119,7 @@ void HtmlPage::add_volume(const EmbeddedVolume& volume) {
   scripts_ = base::Html::format(
       "<script type=\"application/json\" id=\"volume-data\">{}</script>\n<script>{}</script>\n"
       "<script>{}</script>\n",
-      base::Html::made(volume_json(volume).dump()), base::Html::made(std::string(planes_script())),
+      base::Html::made(text_of(volume)), base::Html::made(std::string(planes_script())),
       base::Html::made(std::string(report_script())));
 }
 

@@ -1,10 +1,8 @@
 #include "report/reported_options.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <string_view>
 
@@ -14,31 +12,10 @@
 namespace tomofield::report {
 namespace {
 
-using nlohmann::json;
 using option_table::Row;
-
-constexpr const char* kNoValue = "–";
 
 // These options say where the results are, not what they are made from.
 constexpr std::string_view kOfFiles = "running.";
-
-// Returns the value under a key such as "fit.epochs".
-const json& value_under(const json& options, std::string_view key) {
-  const std::size_t dot = key.find('.');
-  const json& value = options.at(std::string(key.substr(0, dot)));
-  return dot == std::string_view::npos ? value : value_under(value, key.substr(dot + 1));
-}
-
-std::string text_of(const json& value) {
-  if (value.is_null()) return kNoValue;
-  if (value.is_string()) return value.get_ref<const std::string&>().empty() ? kNoValue : value;
-  if (value.is_boolean()) return value.get<bool>() ? "on" : "off";
-  if (value.is_number_float()) return fmt::format("{:.6g}", value.get<double>());
-  if (!value.is_array()) return value.dump();
-  std::vector<std::string> texts;
-  for (const json& item : value) texts.push_back(text_of(item));
-  return fmt::format("{}", fmt::join(texts, ", "));
-}
 
 // Returns the last of an option's names: "--output" of "-o,--output".
 std::string_view long_flag(const Row& row) { return row.flag.substr(row.flag.rfind(',') + 1); }
@@ -72,15 +49,10 @@ const char* text_of(Origin origin) {
   return "";
 }
 
-// Returns the text of a value as the user types it: --no-margin is on if the margin is off.
-std::string typed_text(const Row& row, const json& value) {
-  if (value.is_boolean() && row.flag.starts_with("--no-")) return text_of(!value.get<bool>());
-  return text_of(value);
-}
-
-ReportedOption reported(const Row& row, const json& value, Origin origin) {
+ReportedOption reported(const Row& row, const option_table::Choices& choices) {
+  const Origin origin = option_table::origin_of(row, choices);
   return {.flag = std::string(long_flag(row)),
-          .value = typed_text(row, value),
+          .value = option_table::shown_text(row, choices),
           .origin = text_of(origin),
           .meaning = std::string(row.help),
           .is_default = origin == Origin::kDefault};
@@ -95,7 +67,8 @@ ReportedOption joined(const std::vector<ReportedOption>& parts, std::string_view
     if (option.is_default) option.origin = parts[i].origin;
     option.is_default = false;
   }
-  if (option.value != kNoValue && !unit.empty()) option.value += fmt::format(" {}", unit);
+  if (option.value != option_table::kNoValue && !unit.empty())
+    option.value += fmt::format(" {}", unit);
   return option;
 }
 
@@ -103,7 +76,6 @@ ReportedOption joined(const std::vector<ReportedOption>& parts, std::string_view
 
 std::vector<ReportedOption> reported_options(const SeriesFiles& files, const Options& options) {
   const option_table::Choices choices{files, options};
-  const json values = option_table::to_json(choices);
   std::vector<Setting> settings = options.settings;
   std::vector<ReportedOption> reported_ones;
   std::span<const Row> left = option_table::all_rows();
@@ -112,9 +84,7 @@ std::vector<ReportedOption> reported_options(const SeriesFiles& files, const Opt
     left = left.subspan(rows.size());
     if (rows.front().key.starts_with(kOfFiles)) continue;
     std::vector<ReportedOption> parts;
-    for (const Row& row : rows)
-      parts.push_back(
-          reported(row, value_under(values, row.key), option_table::origin_of(row, choices)));
+    for (const Row& row : rows) parts.push_back(reported(row, choices));
     reported_ones.push_back(joined(parts, rows.front().unit));
     const auto setting = std::ranges::find(settings, long_flag(rows.front()), &Setting::option);
     if (setting == settings.end()) continue;

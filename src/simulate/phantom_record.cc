@@ -1,11 +1,11 @@
 #include "simulate/phantom_record.h"
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <vector>
 
 #include "base/utf8.h"
+#include "io/json.h"
 #include "simulate/phantom.h"
 
 namespace tomofield::simulate {
@@ -113,9 +113,9 @@ Json view_json(const SimulatedView& view, const Misalignment& misalignment) {
 
 }  // namespace
 
-nlohmann::json phantom_json(const SimulationOptions& options, const Phantom& phantom,
-                            std::span<const SimulatedView> views,
-                            const SimulationSummary& summary) {
+void write_phantom_record(const std::filesystem::path& file, const SimulationOptions& options,
+                          const Phantom& phantom, std::span<const SimulatedView> views,
+                          const SimulationSummary& summary) {
   Json json{{"options", options_json(options)},
             {"slab_density", phantom.slab_density},
             {"half_width_px", phantom.half_width_px},
@@ -143,7 +143,7 @@ nlohmann::json phantom_json(const SimulationOptions& options, const Phantom& pha
   // The blobs of a physical specimen would take gigabytes as text.
   if (!phantom.blobs.empty() && !options.is_physical())
     json["blobs_x_y_z_sigma_peak"] = blobs_json(phantom.blobs);
-  return json;
+  io::write_json(file, json);
 }
 
 }  // namespace tomofield::simulate

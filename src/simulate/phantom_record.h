@@ -1,6 +1,6 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
+#include <filesystem>
 #include <span>
 
 #include "simulate/simulate_series.h"
@@ -8,10 +8,11 @@
 
 namespace tomofield::simulate {
 
-/// Returns the record beside a simulated series: the options, the views, and every body, with
+/// Writes the record beside a simulated series: the options, the views, and every body, with
 /// doubles that read back exactly. Positions and lengths are in voxels relative to the volume's
 /// centre, (X, Y, Z).
-nlohmann::json phantom_json(const SimulationOptions& options, const Phantom& phantom,
-                            std::span<const SimulatedView> views, const SimulationSummary& summary);
+void write_phantom_record(const std::filesystem::path& file, const SimulationOptions& options,
+                          const Phantom& phantom, std::span<const SimulatedView> views,
+                          const SimulationSummary& summary);
 
 }  // namespace tomofield::simulate

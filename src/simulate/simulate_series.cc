@@ -13,7 +13,6 @@
 #include "base/statistics.h"
 #include "geometry/raw_from_aligned.h"
 #include "io/images/mrc.h"
-#include "io/json.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_files.h"
 #include "io/saving/output_folder.h"
@@ -411,7 +410,7 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
   write_stacks(files, phantom, specimen, views, options, summary.sigma, results);
   remove_old_references(directory, files, results);
   write_tables(files, views, options, results);
-  io::write_json(files.record, phantom_json(options, phantom, views, summary));
+  write_phantom_record(files.record, options, phantom, views, summary);
   results.commit();
   return summary;
 }

@@ -3,16 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <utility>
 
-#include "io/json.h"
 #include "tomofield/error.h"
 #include "tune/trial_record.h"
 
 namespace tomofield::tune {
-
-using nlohmann::json;
 
 TrialFile::TrialFile(std::filesystem::path path, std::string fingerprint, bool reuse)
     : path_(std::move(path)), fingerprint_(std::move(fingerprint)) {
@@ -20,12 +16,9 @@ TrialFile::TrialFile(std::filesystem::path path, std::string fingerprint, bool r
   const char* advice = "give --overwrite instead of --resume to start over";
   std::string found;
   try {
-    const json document = io::read_json(path_);
-    found = document.at("fingerprint").get<std::string>();
-    for (const json& trial : document.at("trials")) trials_.push_back(trial_from(trial));
-  } catch (const json::exception& error) {
-    throw Error(fmt::format("cannot resume: '{}' is damaged ({}); {}", path_.string(),
-                            io::fault_text(error), advice));
+    StoredTrials stored = read_trials(path_);
+    found = std::move(stored.fingerprint);
+    trials_ = std::move(stored.trials);
   } catch (const Error& error) {
     throw Error(fmt::format("cannot resume: '{}' is damaged ({}); {}", path_.string(), error.what(),
                             advice));
@@ -46,9 +39,7 @@ void TrialFile::add(const FitTrial& trial) {
   trials_.push_back(trial);
   trials_.back().section = {};  // files keep none
   if (path_.empty()) return;
-  json trials = json::array();
-  for (const FitTrial& kept : trials_) trials.push_back(to_json(kept));
-  io::write_json(path_, {{"fingerprint", fingerprint_}, {"trials", trials}});
+  write_trials(path_, {fingerprint_, trials_});
 }
 
 }  // namespace tomofield::tune

@@ -20,8 +20,6 @@
 
 namespace tomofield::tune {
 
-using nlohmann::json;
-
 // Part of the work after which the time that is left can be told. The first steps take longer.
 constexpr double kFirstReport = 0.03;
 
@@ -169,14 +167,11 @@ TrialFits::Trials TrialFits::known_trials(const std::vector<TrialSettings>& batc
                                           const TrialFile* file) {
   Trials trials(batch.size());
   if (!file) return trials;
-  json found = json::array();
-  for (const TrialSettings& settings : batch) {
-    const auto trial = processes_.is_root() ? file->find(settings) : std::nullopt;
-    found.push_back(trial ? to_json(*trial) : json(nullptr));
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const auto trial = processes_.is_root() ? file->find(batch[i]) : std::nullopt;
+    const std::string text = processes_.broadcast(trial ? text_of(*trial) : "");
+    if (!text.empty()) trials[i] = trial_from_text(text);
   }
-  found = json::parse(processes_.broadcast(found.dump()));
-  for (std::size_t i = 0; i < batch.size(); ++i)
-    if (!found[i].is_null()) trials[i] = trial_from(found[i]);
   return trials;
 }
 
@@ -248,9 +243,9 @@ void TrialFits::share(Trials& trials) const {
   for (auto& trial : trials) {
     const double owner = processes_.allreduce_max(trial ? processes_.rank() : -1);
     if (owner < 0) continue;
-    const std::string text = trial ? to_json(*trial).dump() : "";
+    const std::string text = trial ? text_of(*trial) : "";
     Section section = trial ? std::move(trial->section) : Section();
-    trial = trial_from(json::parse(processes_.broadcast(text, static_cast<int>(owner))));
+    trial = trial_from_text(processes_.broadcast(text, static_cast<int>(owner)));
     trial->section = shared_section(std::move(section), static_cast<int>(owner));
   }
 }

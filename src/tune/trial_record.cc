@@ -1,5 +1,7 @@
 #include "tune/trial_record.h"
 
+#include <fmt/format.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -87,6 +89,25 @@ FitTrial trial_from(const json& entry) {
                          : 0.0};
 }
 
+std::string text_of(const FitTrial& trial) { return to_json(trial).dump(); }
+
+FitTrial trial_from_text(const std::string& text) { return trial_from(json::parse(text)); }
+
+void write_trials(const std::filesystem::path& file, const StoredTrials& stored) {
+  json trials = json::array();
+  for (const FitTrial& trial : stored.trials) trials.push_back(to_json(trial));
+  io::write_json(file, {{"fingerprint", stored.fingerprint}, {"trials", trials}});
+}
+
+StoredTrials read_trials(const std::filesystem::path& file) {
+  const auto read = [](const json& document) {
+    StoredTrials stored{.fingerprint = document.at("fingerprint").get<std::string>(), .trials = {}};
+    for (const json& trial : document.at("trials")) stored.trials.push_back(trial_from(trial));
+    return stored;
+  };
+  return io::read_record(file, read, [](const std::string& why) { return why; });
+}
+
 json tuning_json(const TunedFit& tuned) {
   json tuning = tuned_json(tuned, settings_json);
   for (std::size_t i = 0; i < tuned.trials.size(); ++i) {
@@ -109,6 +130,15 @@ TunedFit tuned_from(const json& tuning) {
 
 void write_choice(const std::filesystem::path& file, const std::optional<TunedFit>& tuned) {
   io::write_json(file, tuned ? tuning_json(*tuned) : json(nullptr));
+}
+
+std::optional<TunedFit> read_choice(const std::filesystem::path& file) {
+  const auto read = [](const json& document) {
+    return document.is_null() ? std::nullopt : std::optional(tuned_from(document));
+  };
+  return io::read_record(file, read, [&](const std::string& why) {
+    return fmt::format("'{}' is not the choice of a run: {}", file.string(), why);
+  });
 }
 
 }  // namespace tomofield::tune

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "tune/trial_settings.h"
@@ -40,12 +41,27 @@ nlohmann::json settings_json(const TrialSettings& settings);
 nlohmann::json to_json(const FitTrial& trial);
 FitTrial trial_from(const nlohmann::json& entry);
 
+/// Returns a trial as text that trial_from_text() reads, for other processes of a job.
+std::string text_of(const FitTrial& trial);
+FitTrial trial_from_text(const std::string& text);
+
+/// The finished trials of a search, and what they were made from.
+struct StoredTrials {
+  std::string fingerprint;
+  std::vector<FitTrial> trials;
+};
+void write_trials(const std::filesystem::path& file, const StoredTrials& stored);
+/// Throws Error with what is wrong, but not where.
+StoredTrials read_trials(const std::filesystem::path& file);
+
 /// Writes the chosen settings and all trials, each with its difference to the chosen one. Reads
 /// them as trial_from() does.
 nlohmann::json tuning_json(const TunedFit& tuned);
 TunedFit tuned_from(const nlohmann::json& tuning);
 
-/// Writes tuning_json() to a file, or null without trials.
+/// Writes the trials of a run to a file, or null without trials (`reconstruct --choice FILE`).
 void write_choice(const std::filesystem::path& file, const std::optional<TunedFit>& tuned);
+/// Reads what write_choice() has written. Throws Error for anything else.
+std::optional<TunedFit> read_choice(const std::filesystem::path& file);
 
 }  // namespace tomofield::tune

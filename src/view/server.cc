@@ -3,12 +3,10 @@
 #include <fmt/format.h>
 
 #include <bit>
-#include <nlohmann/json.hpp>
 #include <random>
 #include <string_view>
 #include <utility>
 
-#include "base/utf8.h"
 #include "report/page_texts.h"
 #include "view/http/http_server.h"
 #include "view/page_texts.h"
@@ -26,14 +24,6 @@ std::string random_key() {
   return key;
 }
 
-nlohmann::json description(const ViewedVolume& volume) {
-  return {{"title", base::utf8_text(volume.title())},
-          {"note", volume.note()},
-          {"size", volume.size()},
-          {"voxel_size_A", volume.voxel_size_A()},
-          {"contrast", {volume.contrast().black, volume.contrast().white}}};
-}
-
 Response give(std::string_view text, const char* type) {
   return {.type = type, .body = std::string(text), .more_headers = {}};
 }
@@ -47,7 +37,6 @@ struct Server::Impl {
   std::string own_host() const { return fmt::format("127.0.0.1:{}", http.port()); }
   Answer answer(const Request& request) const;
   Answer plane(const Request& request) const;
-  std::string info() const;
 
   std::vector<std::unique_ptr<ViewedVolume>> volumes;
   std::string key = random_key();
@@ -71,7 +60,7 @@ Answer Server::Impl::answer(const Request& request) const {
   if (name == "page.css") return give(report::page_style(), "text/css; charset=utf-8");
   if (name == "planes.js") return give(report::planes_script(), kScript);
   if (name == "view.js") return give(view_script(), kScript);
-  if (name == "info") return give(info(), "application/json");
+  if (name == "info") return give(info_text(volumes), "application/json");
   if (name == "plane") return plane(request);
   return refusal(404, "there is no such page");
 }
@@ -87,12 +76,6 @@ Answer Server::Impl::plane(const Request& request) const {
                     .body = std::string(bytes, values.size() * sizeof(float)),
                     .more_headers = {}};
   };
-}
-
-std::string Server::Impl::info() const {
-  nlohmann::json all = nlohmann::json::array();
-  for (const auto& volume : volumes) all.push_back(description(*volume));
-  return nlohmann::json{{"volumes", all}, {"largest_side_px", kLargestSide_px}}.dump();
 }
 
 Server::Server(std::vector<std::unique_ptr<ViewedVolume>> volumes, int port)

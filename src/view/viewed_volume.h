@@ -59,6 +59,10 @@ std::unique_ptr<ViewedVolume> open_model(const std::filesystem::path& path);
 /// is free, it is reduced to that.
 std::unique_ptr<ViewedVolume> open_mrc(const std::filesystem::path& path);
 
+/// Returns what the page asks for first (JSON): the volumes, and the largest plane that it may ask
+/// for.
+std::string info_text(const std::vector<std::unique_ptr<ViewedVolume>>& volumes);
+
 /// Opens a file by its contents: a model if it is HDF5, else an MRC volume.
 std::unique_ptr<ViewedVolume> open_volume(const std::filesystem::path& path);
 

@@ -27,6 +27,10 @@ MANY_MODULES = 100  # a smaller project may have any
 RESULT_NAMES = pathlib.Path("output", "output_paths.cc")
 RESULT_NAME = re.compile(r'"(_\w+\.\w+)"')
 
+JSON_ROOMS = {"io", "option_table"}  # readers of files, and the values of options
+JSON_HEADER = re.compile(r'^\s*#\s*include\s*["<](io/json\.h|nlohmann/.*)[">]')
+JSON_WORD = re.compile(r"\bnlohmann\b")
+
 SOURCES = {".h", ".cc", ".cu", ".cuh"}
 QUOTED_INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"')
 ANY_INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
@@ -140,6 +144,17 @@ def offences_in_result_names(src):
                 yield path, number, f"'{name}' is a name of a run's file: take it from {RESULT_NAMES}"
 
 
+def offences_in_json(src):
+    for path in source_files(src):
+        if path.relative_to(src).parts[0] in JSON_ROOMS or path.stem.endswith("_record") \
+                or is_test(path):
+            continue
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+            if JSON_HEADER.match(line) or JSON_WORD.search(line):
+                yield (path, number, "JSON belongs to a record: read and write it in a source "
+                                     "called NAME_record")
+
+
 def offences_in_public_headers(include):
     for path in source_files(include):
         for number, included in includes(path, ANY_INCLUDE):
@@ -175,7 +190,7 @@ def main():
         return 2
     offences = [*offences_in_src(src, project / "tests", rooms), *stale_entries(src, rooms),
                 *offences_in_size(src), *offences_in_modules(src),
-                *offences_in_result_names(src),
+                *offences_in_result_names(src), *offences_in_json(src),
                 *offences_in_public_headers(project / "include"),
                 *offences_in_drawing(project / "docs" / "architecture.md", rooms)]
     for path, number, what in offences:

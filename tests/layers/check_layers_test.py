@@ -64,6 +64,18 @@ def test_a_room_behind_another_one_is_not_named_by_that():
     assert "does not name 'base'" in output, output
 
 
+def test_json_belongs_to_readers_and_records():
+    for include in ("<nlohmann/json.hpp>", "<nlohmann/json_fwd.hpp>", '"io/json.h"'):
+        text = f"#include {include}\n"
+        files = {**FILES, "src/io/json.h": ""}
+        status, output = run_checker({**files, "src/cli/a.cc": text})
+        assert status == 1 and "src/cli/a.cc:1: JSON belongs to a record" in output, output
+        for allowed in ("src/cli/a_record.cc", "src/io/a.cc", "src/cli/a_test.cc"):
+            status, output = run_checker({**files, allowed: text})
+            assert status == 0, output
+    assert check("src/field/a.cc", "using nlohmann::json;\n")[0] == 1
+
+
 def test_catches_a_stale_entry():
     status, output = run_checker({**FILES, "src/cli/all.h": ""})
     assert status == 1, output

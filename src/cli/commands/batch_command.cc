@@ -137,7 +137,8 @@ batch::RunOptions run_options(const fs::path& folder, bool overwrites) {
               },
           .job_ends =
               [](const batch::Job& job, const batch::State& state) {
-                base::log_info(fmt::format("{}: {} after {}{}{}", job.name, name_of(state.progress),
+                base::log_info(fmt::format("{}: {} after {}{}{}", job.name,
+                                           base::name_of(state.progress),
                                            base::time_text(state.costs.wall_seconds),
                                            state.reason.empty() ? "" : ": ", state.reason));
               }};
@@ -197,7 +198,7 @@ void run_task(const CLI::App& command, const BatchArguments& arguments) {
   }
   const auto time_is_up = [] { return stop_was_requested() && stop_status() == 128 + SIGUSR1; };
   const batch::TaskResult result = run_task(options, list, *arguments.task, threads, time_is_up);
-  base::log_info(fmt::format("{}{}{}", name_of(result.state.progress),
+  base::log_info(fmt::format("{}{}{}", base::name_of(result.state.progress),
                              result.state.reason.empty() ? "" : ": ", result.state.reason));
   if (result.state.progress == batch::Progress::kFailed) throw ExitStatus(1, result.state.reason);
   if (result.state.progress == batch::Progress::kStopped && result.continued_by.empty())

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "batch/begun_settings.h"
+#include "batch/choice.h"
 #include "cli/commands/run_reconstruction.h"
 #include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"

@@ -4,8 +4,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
-#include "base/utf8.h"
 #include "cli/commands/commands.h"
 #include "cli/options/common_options.h"
 #include "cli/options/evaluate_options.h"
@@ -18,7 +18,6 @@
 #include "evaluate/resolution/fsc.h"
 #include "evaluate/sheet_filter.h"
 #include "evaluate/similarity.h"
-#include "io/json.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_set.h"
 #include "report/pictures.h"
@@ -29,8 +28,7 @@ namespace {
 
 // All results, which are written after every score has been computed.
 struct Findings {
-  nlohmann::json metrics;
-  std::optional<evaluate::Fsc> fsc;
+  evaluate::EvaluationRecord record;
   std::string profile_csv;
 };
 
@@ -81,10 +79,8 @@ void print_contrast(const evaluate::ContrastScore& score, const evaluate::Region
 void compare_with_truth(const EvaluateArguments& arguments, Findings& findings) {
   const evaluate::VolumePair pair =
       evaluate::read_pair(arguments.volume, *arguments.truth, arguments.box);
-  const evaluate::Comparison comparison = evaluate::compare(pair);
-  findings.metrics.update(
-      evaluate::comparison_json(comparison, arguments.volume, *arguments.truth));
-  print_comparison(comparison);
+  findings.record.comparison = {evaluate::compare(pair), *arguments.truth};
+  print_comparison(findings.record.comparison->scores);
   if (!arguments.profile) return;
   findings.profile_csv = evaluate::profile_csv(
       *arguments.profile, pair.second.voxel_size_A,
@@ -95,16 +91,15 @@ void compare_with_truth(const EvaluateArguments& arguments, Findings& findings) 
 void correlate(const EvaluateArguments& arguments, Findings& findings) {
   const evaluate::FscFiles files{arguments.volume, *arguments.fsc_with, arguments.fsc_mask,
                                  arguments.box, arguments.tilts};
-  findings.fsc = evaluate::correlate_files(files);
-  findings.metrics["fsc"] = evaluate::fsc_json(*findings.fsc, files);
-  print_fsc(*findings.fsc);
+  findings.record.correlation = {evaluate::correlate_files(files), files};
+  print_fsc(findings.record.correlation->fsc);
 }
 
 void find_membranes(const EvaluateArguments& arguments, Findings& findings) {
   const evaluate::VolumePair pair =
       evaluate::read_pair(arguments.volume, *arguments.membranes, std::nullopt);
   const evaluate::DetectionScore score = evaluate::membrane_score(pair.first, pair.second);
-  findings.metrics["membranes"] = evaluate::membrane_json(score, *arguments.membranes);
+  findings.record.membranes = {score, *arguments.membranes};
   print("membranes: best Dice {:.4f}, average precision {:.4f}\n", score.best_dice,
         score.average_precision);
 }
@@ -118,7 +113,7 @@ void find_particles(const EvaluateArguments& arguments, Findings& findings) {
     print("{:<14} average precision {:.4f} of {} particles, radius {:.0f} Å\n", score.kind,
           score.average_precision, score.num_particles, score.radius_A);
   }
-  findings.metrics["picks"] = evaluate::picks_json(scores, *arguments.particles);
+  findings.record.picks = {std::move(scores), *arguments.particles};
 }
 
 void reproject(const EvaluateArguments& arguments, Findings& findings) {
@@ -129,11 +124,11 @@ void reproject(const EvaluateArguments& arguments, Findings& findings) {
       arguments.volume, tilt_series::series_options(files, chosen), chosen.specimen,
       chosen.field.with_margin, arguments.hold_out};
   const evaluate::VolumeScore score = evaluate::score_volume(options);
-  findings.metrics["reprojection"] = evaluate::volume_score_json(score, options);
   print("reprojection error {:.4f} of the noise's variance in {} views\n", score.errors.total,
         score.errors.views.size());
   for (std::size_t v = 0; v < score.tilt_deg.size(); ++v)
     print("  {:7.2f}°  {:.4f}\n", score.tilt_deg[v], score.errors.view_error[v]);
+  findings.record.reprojection = {score, options};
 }
 
 void measure_contrast(const EvaluateArguments& arguments, const base::Volume& volume,
@@ -141,8 +136,7 @@ void measure_contrast(const EvaluateArguments& arguments, const base::Volume& vo
   const bool chosen = arguments.regions.foreground.empty();
   const evaluate::Regions regions = chosen ? evaluate::choose_regions(volume) : arguments.regions;
   const evaluate::ContrastScore score = evaluate::contrast_score(volume, regions);
-  findings.metrics["contrast"] = evaluate::contrast_json(score, regions);
-  findings.metrics["contrast"]["regions_chosen"] = chosen;
+  findings.record.contrast = {score, regions, chosen};
   print_contrast(score, regions, chosen);
 }
 
@@ -155,7 +149,8 @@ void measure_artefacts(const EvaluateArguments& arguments, const base::Volume& v
                        Findings& findings) {
   const evaluate::Artefacts found =
       evaluate::find_artefacts(volume, arguments.volume, arguments.model);
-  findings.metrics.update(evaluate::artefacts_json(found.speckle, found.faces));
+  findings.record.speckle = found.speckle;
+  findings.record.faces = found.faces;
   if (found.speckle) print("speckle {:.5f} %\n", 100 * *found.speckle);
   if (found.faces)
     print("face jump {:.4f} (along X {}, along Y {})\n", found.faces->both,
@@ -181,17 +176,19 @@ void examine(const EvaluateArguments& arguments, Findings& findings) {
 
 void write_findings(const EvaluateArguments& arguments, const Findings& findings) {
   io::OutputSet results;
-  if (arguments.json) io::write_json(*arguments.json, findings.metrics);
-  if (arguments.fsc_csv) io::write_text_file(*arguments.fsc_csv, evaluate::fsc_csv(*findings.fsc));
-  if (arguments.fsc_picture) report::write_fsc_picture(*findings.fsc, *arguments.fsc_picture);
+  const evaluate::EvaluationRecord& record = findings.record;
+  if (arguments.json) evaluate::write_record(*arguments.json, record);
+  if (arguments.fsc_csv)
+    io::write_text_file(*arguments.fsc_csv, evaluate::fsc_csv(record.correlation->fsc));
+  if (arguments.fsc_picture)
+    report::write_fsc_picture(record.correlation->fsc, *arguments.fsc_picture);
   if (arguments.profile_csv) io::write_text_file(*arguments.profile_csv, findings.profile_csv);
   results.commit();
 }
 
 void run_evaluate(const EvaluateArguments& arguments) {
   const std::vector<io::OutputLock> locks = arguments.claim_outputs();
-  Findings findings;
-  findings.metrics["reconstruction"] = base::utf8_text(arguments.volume.string());
+  Findings findings{.record = {.volume = arguments.volume}, .profile_csv = {}};
   if (arguments.truth) compare_with_truth(arguments, findings);
   if (arguments.fsc_with) correlate(arguments, findings);
   if (arguments.membranes) find_membranes(arguments, findings);

@@ -6,13 +6,12 @@
 
 #include "base/progress.h"
 #include "base/threads/parallel.h"
-#include "base/utf8.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
-#include "io/json.h"
 #include "io/saving/output_files.h"
 #include "plan/plan.h"
 #include "reconstruct/run_files.h"
+#include "record/plan_record.h"
 #include "tilt_series/planned_series.h"
 
 namespace tomofield::cli {
@@ -37,10 +36,34 @@ bool is_left_to_runs(const options::ReconstructOptions& options, bool is_open) {
   return is_open && !options.fit.tune;
 }
 
-std::vector<std::string> texts_of(const std::vector<std::filesystem::path>& files) {
-  std::vector<std::string> texts;
-  for (const auto& file : files) texts.push_back(file.string());
-  return texts;
+// Returns every file that a run reads.
+std::vector<std::filesystem::path> inputs_of(const options::ReconstructOptions& options) {
+  std::vector<std::filesystem::path> inputs = io::input_files(options.files);
+  for (const auto& added : io::added_inputs()) inputs.push_back(added);
+  return inputs;
+}
+
+record::PlanRecord record_of(const options::ReconstructOptions& options, const plan::RunPlan& plan,
+                             const plan::RunEstimate& estimate) {
+  const tune::OpenSettings open = options.open_settings();
+  return {.stack = std::filesystem::absolute(options.files.stack).lexically_normal().string(),
+          .num_views = plan.num_views,
+          .view_size_px = {plan.view_width, plan.view_height},
+          .pixel_size_A = plan.pixel_size_A,
+          .num_parameters = static_cast<std::int64_t>(plan.num_parameters),
+          .num_trials = plan.num_trials,
+          .open_variation = is_left_to_runs(options, open.variation),
+          .open_spike_rank = is_left_to_runs(options, open.spikes),
+          .open_prior = is_left_to_runs(options, open.prior),
+          .num_steps = plan.num_steps,
+          .num_threads = base::thread_count(),
+          .memory_bytes = static_cast<std::int64_t>(plan.memory_bytes),
+          .core_seconds = estimate.core_seconds,
+          .sample_steps = estimate.sample_steps,
+          .result_bytes = static_cast<std::int64_t>(estimate.result_bytes),
+          .disk_bytes = static_cast<std::int64_t>(estimate.disk_bytes),
+          .inputs = inputs_of(options),
+          .results = reconstruction::result_files(options)};
 }
 
 }  // namespace
@@ -71,34 +94,9 @@ void write_plan(const std::filesystem::path& file, const options::ReconstructOpt
     require_few_vertices(plan);
     const std::size_t of_one_thread = memory_of_one_thread(series, options, processes);
     if (!processes.is_root()) return;
-    const plan::RunEstimate estimate = plan::estimate_run(series, options, plan);
-    std::vector<std::filesystem::path> inputs = io::input_files(options.files);
-    for (const auto& added : io::added_inputs()) inputs.push_back(added);
-    const nlohmann::json seconds =
-        estimate.core_seconds ? nlohmann::json(*estimate.core_seconds) : nlohmann::json(nullptr);
-    const std::string stack =
-        std::filesystem::absolute(options.files.stack).lexically_normal().string();
-    io::write_json(file,
-                   {{"tomofield", TOMOFIELD_VERSION},
-                    {"stack", base::utf8_text(stack)},
-                    {"views", plan.num_views},
-                    {"view_size_px", {plan.view_width, plan.view_height}},
-                    {"pixel_size_A", plan.pixel_size_A},
-                    {"parameters", plan.num_parameters},
-                    {"trials", plan.num_trials},
-                    {"open_variation", is_left_to_runs(options, options.open_settings().variation)},
-                    {"open_spike_rank", is_left_to_runs(options, options.open_settings().spikes)},
-                    {"open_prior", is_left_to_runs(options, options.open_settings().prior)},
-                    {"steps", plan.num_steps},
-                    {"threads", base::thread_count()},
-                    {"memory_bytes", plan.memory_bytes},
-                    {"memory_bytes_of_one_thread", of_one_thread},
-                    {"core_seconds", seconds},
-                    {"sample_steps", estimate.sample_steps},
-                    {"result_bytes", estimate.result_bytes},
-                    {"disk_bytes", estimate.disk_bytes},
-                    {"inputs", texts_of(inputs)},
-                    {"results", texts_of(reconstruction::result_files(options))}});
+    record::PlanRecord record = record_of(options, plan, plan::estimate_run(series, options, plan));
+    record.memory_bytes_of_one_thread = static_cast<std::int64_t>(of_one_thread);
+    record::write_plan(file, record);
   });
 }
 

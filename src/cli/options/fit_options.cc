@@ -8,7 +8,7 @@
 #include "cli/options/number_checks.h"
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
-#include "io/json.h"
+#include "record/plan_record.h"
 
 namespace tomofield::cli {
 namespace {
@@ -66,7 +66,7 @@ void add_grid_option(CLI::App& command, std::optional<std::filesystem::path>& fi
 }
 
 void write_grid(const std::filesystem::path& file, const Sizes& sizes) {
-  io::write_json(file, {{"grid", {{"size", voxels_of(sizes)}, {"voxel_A", sizes.pixel_size_A}}}});
+  record::write_grid(file, {voxels_of(sizes), sizes.pixel_size_A});
 }
 
 }  // namespace tomofield::cli

@@ -38,7 +38,7 @@ void print_sizes(const Sizes& sizes);
 void add_grid_option(CLI::App& command, std::optional<std::filesystem::path>& file);
 
 /// Writes the voxels that the tomogram will have along the axes of its file, and their size, for
-/// programs (compare::read_planned_grid()).
+/// programs (record::read_planned_grid()).
 void write_grid(const std::filesystem::path& file, const Sizes& sizes);
 
 }  // namespace tomofield::cli

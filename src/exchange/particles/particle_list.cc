@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
 #include "base/log.h"
 #include "base/plausible.h"
 #include "io/tables/fiducial_points.h"
+#include "output/model_input_record.h"
 #include "output/volume_frame.h"
 #include "tomofield/error.h"
 
@@ -34,11 +34,7 @@ constexpr double kCentre_px = 0.5;
 
 /// Returns the size of an unbinned pixel of the series, as far as the options of the run tell.
 double unbinned_pixel_A(const output::ModelInfo& model) {
-  const auto options = nlohmann::json::parse(model.options_json, nullptr, false);
-  if (!options.is_object()) return model.pixel_size_A;
-  const nlohmann::json bin =
-      options.value("input", nlohmann::json::object()).value("bin", nlohmann::json());
-  return model.pixel_size_A / (bin.is_number() ? std::max(bin.get<double>(), 1.0) : 1.0);
+  return model.pixel_size_A / output::input_of(model).bin;
 }
 
 // ------------------------------------------------------------------ RELION

@@ -11,9 +11,9 @@
 #include "io/images/mrc.h"
 #include "io/saving/atomic_file.h"
 #include "output/box_bounds.h"
+#include "output/model_input_record.h"
 #include "output/sample_model.h"
 #include "output/volume.h"
-#include "output/volume_labels.h"
 #include "tomofield/error.h"
 
 namespace tomofield::exchange {

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 
+#include "base/enum_names.h"
 #include "base/system/child_process.h"
 #include "batch/job.h"
 
@@ -11,14 +13,6 @@ namespace tomofield::batch {
 
 /// The progress of a job.
 enum class Progress { kWaiting, kRunning, kDone, kFailed, kStopped, kSkipped };
-NLOHMANN_JSON_SERIALIZE_ENUM(Progress, {{Progress::kWaiting, "waiting"},
-                                        {Progress::kRunning, "running"},
-                                        {Progress::kDone, "done"},
-                                        {Progress::kFailed, "failed"},
-                                        {Progress::kStopped, "stopped"},
-                                        {Progress::kSkipped, "skipped"}})
-/// Returns "waiting", "running", …
-std::string name_of(Progress progress);
 
 /// The progress of a job, with its costs in all sessions.
 struct State {
@@ -41,3 +35,12 @@ State read_state(const std::filesystem::path& folder, const Job& job);
 void write_state(const std::filesystem::path& folder, const Job& job, const State& state);
 
 }  // namespace tomofield::batch
+
+template <>
+struct tomofield::base::EnumNames<tomofield::batch::Progress> {
+  using Progress = tomofield::batch::Progress;
+  static constexpr std::array kNames{
+      std::pair{Progress::kWaiting, "waiting"}, std::pair{Progress::kRunning, "running"},
+      std::pair{Progress::kDone, "done"},       std::pair{Progress::kFailed, "failed"},
+      std::pair{Progress::kStopped, "stopped"}, std::pair{Progress::kSkipped, "skipped"}};
+};

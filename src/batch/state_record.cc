@@ -1,4 +1,4 @@
-#include "batch/state.h"
+#include "batch/state_record.h"
 
 #include <cstdint>
 
@@ -10,8 +10,6 @@ namespace tomofield::batch {
 
 using nlohmann::json;
 namespace fs = std::filesystem;
-
-std::string name_of(Progress progress) { return json(progress).get<std::string>(); }
 
 fs::path log_folder(const fs::path& folder) { return folder / "logs"; }
 
@@ -26,7 +24,9 @@ fs::path state_file_of(const fs::path& folder, const Job& job) {
 State read_state(const fs::path& folder, const Job& job) {
   try {
     const json state = io::read_json(state_file_of(folder, job));
-    return {.progress = state.at("progress").get<Progress>(),
+    const auto progress = base::enum_named<Progress>(state.at("progress").get<std::string>());
+    if (!progress) return {};
+    return {.progress = *progress,
             .reason = state.at("reason").get<std::string>(),
             .costs = {.core_seconds = io::number_at(state, "core_seconds", 0, base::kLargestNumber),
                       .wall_seconds = io::number_at(state, "wall_seconds", 0, base::kLargestNumber),
@@ -39,7 +39,7 @@ State read_state(const fs::path& folder, const Job& job) {
 }
 
 void write_state(const fs::path& folder, const Job& job, const State& state) {
-  io::write_json(state_file_of(folder, job), {{"progress", state.progress},
+  io::write_json(state_file_of(folder, job), {{"progress", base::name_of(state.progress)},
                                               {"reason", state.reason},
                                               {"core_seconds", state.costs.core_seconds},
                                               {"wall_seconds", state.costs.wall_seconds},

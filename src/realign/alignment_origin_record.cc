@@ -1,4 +1,4 @@
-#include "realign/alignment_origin.h"
+#include "realign/alignment_origin_record.h"
 
 #include <fmt/format.h>
 
@@ -16,11 +16,11 @@
 
 #include "base/xxhash64.h"
 #include "io/images/image_stack.h"
-#include "io/json.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/text_lines.h"
 #include "io/tables/view_table.h"
 #include "measurement/view_transfers.h"
+#include "options/options_record.h"
 #include "tilt_series/planned_series.h"
 #include "tomofield/error.h"
 
@@ -129,7 +129,7 @@ alignment::AlignmentOrigin alignment_origin(const options::ReconstructOptions& o
 alignment::AlignmentRecord read_alignment_record(const std::filesystem::path& path,
                                                  const alignment::AlignmentOrigin& origin) {
   try {
-    alignment::AlignmentRecord record = alignment::record_from(io::read_json(path));
+    alignment::AlignmentRecord record = alignment::read_record(path);
     require_origin(record.origin, origin);
     return record;
   } catch (const std::exception& error) {

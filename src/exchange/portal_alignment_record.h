@@ -1,15 +1,15 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "options/run_options.h"
 #include "tilt_series/planned_series.h"
 
 namespace tomofield::exchange {
 
-/// Returns the alignment of the views as the CryoET Data Portal has it (alignment_metadata.json).
-/// With positions from the middles of the specimen and of the recorded view, in unbinned pixels,
+/// Writes the alignment of the views beside the tomogram, as the CryoET Data Portal has it
+/// (alignment_metadata.json). With positions from the middles of the specimen and of the recorded
+/// view, in unbinned pixels,
 ///
 ///     view = in_plane_rotation · Ry(tilt_angle) · Rx(volume_x_rotation) · specimen
 ///            + (x_offset, y_offset),
@@ -18,8 +18,8 @@ namespace tomofield::exchange {
 /// Views that were left out are not in it. The sizes are those of the volume whose contents are in
 /// the file `volume`, in Å; volume_offset is its middle relative to the middle of the aligned view
 /// and the tilt axis. A volume that is mirrored in Z has the angles with the sign turned.
-nlohmann::json portal_alignment(const tilt_series::PlannedSeries& series,
-                                const options::ReconstructOptions& options,
-                                const std::filesystem::path& volume);
+void write_portal_alignment(const tilt_series::PlannedSeries& series,
+                            const options::ReconstructOptions& options,
+                            const std::filesystem::path& volume);
 
 }  // namespace tomofield::exchange

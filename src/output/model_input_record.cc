@@ -1,12 +1,13 @@
-#include "output/volume_labels.h"
+#include "output/model_input_record.h"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <utility>
 
+#include "io/json.h"
 #include "tomofield/version.h"
 
 namespace tomofield::output {
@@ -29,16 +30,27 @@ std::string ascii_only(std::string text) {
 
 }  // namespace
 
+ModelInput input_of(const ModelInfo& info) {
+  ModelInput found;
+  const auto options = nlohmann::json::parse(info.options_json, nullptr, false);
+  const auto input = options.is_object() ? options.find("input") : options.end();
+  if (input == options.end() || !input->is_object()) return found;
+  for (const auto& entry : input->items()) {
+    if (entry.value().is_string())
+      found.files[entry.key()] = entry.value().get<std::string>();
+    else if (entry.key() == "bin" && entry.value().is_number())
+      found.bin = std::max(entry.value().get<double>(), 1.0);
+  }
+  return found;
+}
+
 std::vector<std::string> volume_labels(const ModelInfo& info, const std::string& made_by) {
   std::vector<std::string> labels{fmt::format("tomofield {}: {}", library_version(), made_by)};
-  const auto options = nlohmann::json::parse(info.options_json, nullptr, false);
-  if (!options.is_object() || !options.contains("input")) return labels;
-  const nlohmann::json& input = options["input"];
+  const ModelInput input = input_of(info);
   for (const auto& [key, what] : kFiles) {
-    const auto file = input.find(key);
-    if (file == input.end() || !file->is_string()) continue;
-    const std::filesystem::path path = file->get<std::string>();
-    labels.push_back(ascii_only(fmt::format("{}: {}", what, path.filename().string())));
+    const auto file = input.files.find(key);
+    if (file != input.files.end())
+      labels.push_back(ascii_only(fmt::format("{}: {}", what, file->second.filename().string())));
   }
   return labels;
 }

@@ -1,9 +1,11 @@
-#include "exchange/portal_alignment.h"
+#include "exchange/portal_alignment_record.h"
 
 #include <array>
 #include <utility>
 
 #include "io/images/mrc.h"
+#include "io/json.h"
+#include "output/output_paths.h"
 
 namespace tomofield::exchange {
 
@@ -49,8 +51,8 @@ json section_json(const tilt_series::PlannedSeries& series, std::size_t index, i
 
 }  // namespace
 
-json portal_alignment(const tilt_series::PlannedSeries& series,
-                      const options::ReconstructOptions& options, const fs::path& volume) {
+void write_portal_alignment(const tilt_series::PlannedSeries& series,
+                            const options::ReconstructOptions& options, const fs::path& volume) {
   const SpecimenOptions& specimen = options.specimen;
   const double pixel_A = series.pixel_size_A() / series.bin_factor();
   const Place place =
@@ -66,7 +68,7 @@ json portal_alignment(const tilt_series::PlannedSeries& series,
   json sections = json::array();
   for (std::size_t i = 0; i < series.views().size(); ++i)
     sections.push_back(section_json(series, i, specimen.hand));
-  return {
+  const json record{
       {"alignment_type", "GLOBAL"},
       {"format", "TOMOFIELD"},
       {"is_portal_standard", true},
@@ -76,6 +78,7 @@ json portal_alignment(const tilt_series::PlannedSeries& series,
       {"volume_offset", vector_json(offset_A)},
       {"volume_dimension", vector_json(place.size_A)},
       {"per_section_alignment_parameters", sections}};
+  io::write_json(output::output_paths(options.run.output).portal_alignment, record);
 }
 
 }  // namespace tomofield::exchange

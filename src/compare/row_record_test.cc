@@ -1,4 +1,4 @@
-#include "compare/rows.h"
+#include "compare/row_record.h"
 
 #include <gtest/gtest.h>
 
@@ -14,10 +14,10 @@ using testing::message_of;
 
 class RowFile : public ::testing::Test {
  protected:
-  nlohmann::json origin(const std::vector<std::string>& command = {"baseline", "wbp"}) const {
+  RunOrigin origin(const std::vector<std::string>& command = {"baseline", "wbp"}) const {
     return origin_of(command, {series_, angles_});
   }
-  std::string refusal(const nlohmann::json& now) const {
+  std::string refusal(const RunOrigin& now) const {
     return message_of<Error>([&] { read_row(row_, now); });
   }
   testing::ScratchDirectory directory_;
@@ -49,8 +49,8 @@ TEST_F(RowFile, NamesEverythingThatHasChanged) {
 }
 
 TEST_F(RowFile, OfAnotherVersionIsRefused) {
-  nlohmann::json earlier = origin();
-  earlier["tomofield"] = "0.0.1";
+  RunOrigin earlier = origin();
+  earlier.version = "0.0.1";
   write_row(row_, earlier, {Progress::kFinished, {}});
   EXPECT_NE(refusal(origin()).find("tomofield 0.0.1"), std::string::npos);
 }

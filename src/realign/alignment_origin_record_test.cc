@@ -1,4 +1,4 @@
-#include "realign/alignment_origin.h"
+#include "realign/alignment_origin_record.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
