@@ -182,10 +182,43 @@ py::dict run_baseline(const TiltSeries& series, BaselineMethod method,
   return result;
 }
 
-void export_box(const Model& model, const SampleBox& box, const std::filesystem::path& path,
-                const option_table::Choices& choices) {
+// Angles as Python has them: (pitch, x_tilt).
+std::optional<Levelling> levelling_of(const std::optional<std::pair<double, double>>& level) {
+  if (!level) return std::nullopt;
+  return Levelling{.pitch_deg = level->first, .x_tilt_deg = level->second};
+}
+
+VolumeFile file_of(const std::filesystem::path& path, const option_table::Choices& choices) {
+  return {path, choices.options.volume, choices.options.run.overwrite};
+}
+
+std::pair<double, double> level_found(const Model& model) {
   const Unlocked unlocked;
-  export_volume(model, box, {path, choices.options.volume, choices.options.run.overwrite});
+  const Levelling found = found_levelling(model);
+  return {found.pitch_deg, found.x_tilt_deg};
+}
+
+void export_box(const Model& model, const std::optional<SampleBox>& box, double voxel_px,
+                const std::optional<std::pair<double, double>>& level,
+                const std::filesystem::path& path, const option_table::Choices& choices) {
+  const Unlocked unlocked;
+  export_volume(model, {.box = box, .voxel_px = voxel_px, .level = levelling_of(level)},
+                file_of(path, choices));
+}
+
+std::pair<std::size_t, std::size_t> cut_particles(
+    const Model& model, const std::filesystem::path& list, std::int64_t size, double voxel_px,
+    const std::string& tomogram, const std::optional<std::pair<double, double>>& level,
+    const std::filesystem::path& path, const option_table::Choices& choices) {
+  const Unlocked unlocked;
+  const auto [count, num_beyond] = export_particles(model,
+                                                    {.list = list,
+                                                     .size = size,
+                                                     .voxel_px = voxel_px,
+                                                     .tomogram = tomogram,
+                                                     .level = levelling_of(level)},
+                                                    file_of(path, choices));
+  return {count, num_beyond};
 }
 
 py::tuple read_volume(const std::filesystem::path& path) {
@@ -276,8 +309,10 @@ void add_model(py::module_& module) {
   module.def("write_mrc", &write_volume);
 }
 
+  module.def("found_levelling", &level_found);
 void add_evaluate(py::module_& module) {
   py::class_<VolumeScores>(module, "VolumeScores", "How alike a volume is to the truth.")
+  module.def("export_particles", &cut_particles);
       .def_readonly("psnr_raw_dB", &VolumeScores::psnr_raw_dB)
       .def_readonly("psnr_affine_dB", &VolumeScores::psnr_affine_dB,
                     "after the best scale and offset")

@@ -281,6 +281,7 @@ output::ModelInfo model_info(const measurement::Measurement& series,
                              const options::ReconstructOptions& options) {
   output::ModelInfo info = output::model_info(series, options.views.contrast);
   info.options_json = options::options_json(options).dump();
+  if (options.alignment) info.alignment_json = alignment::to_json(options.alignment->origin).dump();
   return info;
 }
 

@@ -2,6 +2,7 @@
 
 import base64
 import io
+import json
 import re
 
 import mrcfile
@@ -113,6 +114,86 @@ def test_export_writes_what_the_command_writes(series, made, tmp_path):
     with pytest.raises(tomofield.Error, match="leave voxel_size_A out"):
         tomofield.export(model, tmp_path / "x.mrc", box=tomofield.Box((9, 9, 9), (2, 2, 2)),
                          voxel_size_A=5)
+
+
+def same_files(folder, *names):
+    for name in names:
+        assert (folder / name).read_bytes() == (folder / f"cli_{name}").read_bytes(), name
+
+
+def test_export_levels_as_the_command_does(series, made, tmp_path):
+    model = series.folder / "tomogram.h5"
+    for name, words, options in (
+            ("all.mrc", ("--level", "3,-2"), {"level": (3, -2)}),
+            ("box.mrc", ("--level", "3,-2", "--center", "12,13,8", "--size", "9,8,7"),
+             {"level": (3, -2), "box": tomofield.Box((12, 13, 8), (9, 8, 7))})):
+        series.run("export", model, "-o", tmp_path / f"cli_{name}", *words)
+        tomofield.export(model, tmp_path / name, **options)
+        same_files(tmp_path, name)
+    for wrong, said in (((3, 95), "not below 90°"), ((3, np.nan), "not below 90°")):
+        with pytest.raises(tomofield.Error, match=said):
+            tomofield.export(model, tmp_path / "x.mrc", level=wrong)
+    for wrong in (3, (1, 2, 3), "lost", ("a", "b")):
+        with pytest.raises(TypeError, match="level is 'found' or two angles in degrees"):
+            tomofield.export(model, tmp_path / "x.mrc", level=wrong)
+    with pytest.raises(tomofield.Error, match="angles of its own cannot be levelled"):
+        tomofield.export(model, tmp_path / "x.mrc", level=(3, 2),
+                         box=tomofield.Box((12, 13, 8), (9, 8, 7), euler_deg=(1, 0, 0)))
+    with pytest.raises(tomofield.Error, match="tomogram_align.json' beside"):
+        tomofield.export(model, tmp_path / "x.mrc", level="found")
+    with pytest.raises(tomofield.Error, match="model in memory has no alignment"):
+        tomofield.export(made.model, tmp_path / "x.mrc", level="found")
+    assert not (tmp_path / "x.mrc").exists()
+
+
+def test_export_takes_the_level_that_was_found(series, tmp_path):
+    model = tmp_path / "tomogram.h5"
+    model.write_bytes((series.folder / "tomogram.h5").read_bytes())
+    views = [{"section": i + 1, "tilt_deg": tilt, "shift_px": [0, 0], "rotation_deg": 0,
+              "log_magnification": 0, "tilt_change_deg": 0, "correlation": 0.9,
+              "shift_error_px": [0.1, 0.1], "left_out": False}
+             for i, tilt in enumerate(series.tilt_deg)]
+    pose = {"pitch_deg": 5, "pitch_error_deg": 1, "x_tilt_deg": -4, "x_tilt_error_deg": 1,
+            "thickness_px": 16, "thickness_error_px": 2}
+    (tmp_path / "tomogram_align.json").write_text(json.dumps(
+        {"made_with": {}, "accepted": True, "rotation": True, "magnification": True, "tilt": True,
+         "steps_px": [0.1], "seconds": 1, "views": views, "pose": pose,
+         "series": {"sections": len(views), "size_px": [32, 32], "files": {}, "header_tilts": "0",
+                    "pixels": "0"},
+         "held_out_error": {"before": 0.5, "after": 0.4},
+         "gain": {"mean": 0.1, "standard_error": 0.01}}))
+    tomofield.export(tomofield.Model(model), tmp_path / "found.mrc", level="found")
+    tomofield.export(model, tmp_path / "given.mrc", level=(5, -4))
+    assert (tmp_path / "found.mrc").read_bytes() == (tmp_path / "given.mrc").read_bytes()
+
+
+def test_export_cuts_particles_as_the_command_does(series, made, tmp_path):
+    model, points = series.folder / "tomogram.h5", tmp_path / "points.txt"
+    points.write_text("12 13 8\n20 14 7\n")
+    series.run("export", model, "-o", tmp_path / "cli_cut.mrc", "--particles", points, "--box", 6,
+               "--voxel-size", 12, "--level", "3,-2", "--mode", 12)
+    tomofield.export(model, tmp_path / "cut.mrc", particles=points, box=6, voxel_size_A=12,
+                     level=(3, -2), voxel_type="float16")
+    same_files(tmp_path, "cut.mrc")
+    written = (tmp_path / "cli_cut.star").read_text()
+    assert (tmp_path / "cut.star").read_text() == written.replace("cli_cut.mrc", "cut.mrc")
+    tomofield.export(made.model, tmp_path / "memory.mrc", particles=points, box=6, tomogram="TS_01")
+    assert "TS_01" in (tmp_path / "memory.star").read_text()
+    with pytest.raises(tomofield.Error, match="name: give that of its tomogram"):
+        tomofield.export(made.model, tmp_path / "x.mrc", particles=points, box=6)
+    with pytest.raises(tomofield.Error, match="from 1 to 4096"):
+        tomofield.export(model, tmp_path / "x.mrc", particles=points, box=0)
+    with pytest.raises(tomofield.Error, match="leave --zarr and --axes out"):
+        tomofield.export(model, tmp_path / "x.mrc", particles=points, box=6, zarr=True)
+    with pytest.raises(tomofield.Error, match="cut.mrc' exists"):
+        tomofield.export(model, tmp_path / "cut.mrc", particles=points, box=6)
+    with pytest.raises(TypeError, match="cubes of particles in voxels, is a whole number"):
+        tomofield.export(model, tmp_path / "x.mrc", particles=points)
+    with pytest.raises(TypeError, match="a side alone is for particles"):
+        tomofield.export(model, tmp_path / "x.mrc", box=6)
+    with pytest.raises(tomofield.Error, match="give their list with particles"):
+        tomofield.export(model, tmp_path / "x.mrc", tomogram="TS_01")
+    assert not (tmp_path / "x.mrc").exists()
 
 
 @pytest.mark.parametrize("method", ("wbp", "sirt", "sart-tv", "tv"))
