@@ -168,17 +168,20 @@ py::dict run(const TiltSeries& series, const option_table::Choices& choices, py:
 }
 
 py::dict run_baseline(const TiltSeries& series, BaselineMethod method,
-                      const option_table::Choices& choices, py::object callback) {
+                      const option_table::Choices& choices, const MethodOptions& method_options,
+                      py::object callback) {
   const Listener listener(std::move(callback));
   Baseline made;
   {
     const Unlocked unlocked;
-    made = reconstruct_baseline(series, method, choices.options, listener.callback());
+    made =
+        reconstruct_baseline(series, method, choices.options, method_options, listener.callback());
   }
   py::dict result;
   result["is_finished"] = made.is_finished;
   result["metrics"] = made.metrics;
-  result["tomogram"] = to_tuple(std::move(made.tomogram));
+  result["tomogram"] = py::none();
+  if (made.tomogram) result["tomogram"] = to_tuple(std::move(*made.tomogram));
   return result;
 }
 
@@ -280,7 +283,9 @@ void add_reconstruct(py::module_& module) {
       .value("wbp", BaselineMethod::kWbp)
       .value("sirt", BaselineMethod::kSirt)
       .value("sart-tv", BaselineMethod::kSartTv)
-      .value("tv", BaselineMethod::kTv);
+      .value("tv", BaselineMethod::kTv)
+      .value("ingp", BaselineMethod::kIngp)
+      .value("fourier-net", BaselineMethod::kFourierNet);
   module.def("open_project", &open);
   module.def("align", &align_series);
   module.def("reconstruct", &run);

@@ -18,6 +18,8 @@ from .options import Options
 Source = Union[Path, Project, npt.ArrayLike]
 Watch = Union[Callback, bool, None]
 
+Method = Literal["wbp", "sirt", "sart-tv", "tv", "ingp", "fourier-net"]
+MethodOption = Union[str, float, bool]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Reconstruction:
@@ -116,25 +118,35 @@ def denoise(made: Reconstruction, strength: Union[str, float], *, output: Path =
     return _run(settled, core, progress)
 
 
-def baseline(source: Source, method: Literal["wbp", "sirt", "sart-tv", "tv"] = "wbp",
-             tilt_deg: Optional[Sequence[float]] = None, *, series: str = "",
+def baseline(source: Source, method: Method = "wbp", tilt_deg: Optional[Sequence[float]] = None, *,
+             method_options: Optional[Mapping[str, MethodOption]] = None, series: str = "",
              progress: Watch = None, **options: Unpack[Options]) -> Reconstruction:
-    """Reconstruct by another method, to compare with, as `tomofield baseline` does by default.
+    """Reconstruct by another method, to compare with, as `tomofield baseline` does.
 
     method: weighted back-projection, simultaneous iterative reconstruction, ordered subsets with
-        total variation, or least squares with total variation.
-    The other arguments are those of reconstruct(), but for `output`: the result stays in memory,
-    and Tomogram.write() writes it. Options of the field have no effect.
+        total variation, least squares with total variation, a network with a hash grid, or a
+        network of plane waves.
+    method_options: what `tomofield baseline METHOD --help` lists under "Method", and ctf_correction:
+        {"iterations": 80, "penalty": "concave", "non_negative": False}.
+    The other arguments are those of reconstruct(). With `output`, the tomogram, its metrics and its
+    pictures are written as files. Options of the field have no effect.
     """
     methods = _core.BaselineMethod.__members__
     if method not in methods:
         raise Error(f"the method is one of {', '.join(map(repr, methods))}, not {method!r}")
     choices, core = _inputs(source, tilt_deg, series, options)
     with watched(progress) as callback:
-        made = _core.baseline(core, methods[method], choices, callback)
+    if method_options is not None and not isinstance(method_options, Mapping):
+        raise TypeError("method_options are names with values, as {'iterations': 80}, not "
+                        f"{method_options!r}")
+    own = {str(name).replace("_", "-"): _text_of(value)
+           for name, value in (method_options or {}).items()}
+    with watched(progress) as callback:
+        made = _core.baseline(core, methods[method], choices, own, callback)
     if not made["is_finished"]:
         return Reconstruction(False, None, None, Record())
-    return Reconstruction(True, Tomogram(*made["tomogram"]), None, record_of(made["metrics"]))
+    return Reconstruction(True, None if made["tomogram"] is None else Tomogram(*made["tomogram"]),
+                          None, record_of(made["metrics"]))
 
 
 def align(source: Source, tilt_deg: Optional[Sequence[float]] = None, *, series: str = "",
@@ -152,6 +164,13 @@ def align(source: Source, tilt_deg: Optional[Sequence[float]] = None, *, series:
 
 
 def _run(choices: _core.Choices, core: _core.TiltSeries, progress: Watch) -> Reconstruction:
+def _text_of(value: MethodOption) -> str:
+    """Return the value of a method's option as the command line takes it."""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return str(value)
+
+
     with watched(progress) as callback:
         made = _core.reconstruct(core, choices, callback)
     if not made["is_finished"]:
