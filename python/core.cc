@@ -309,15 +309,22 @@ void add_model(py::module_& module) {
       .def("region", &Model::region)
       .def("sample", &sample)
       .def("sample_points", &sample_points);
+  module.def("found_levelling", &level_found);
   module.def("export_box", &export_box);
+  module.def("export_particles", &cut_particles);
   module.def("read_mrc", &read_volume);
   module.def("write_mrc", &write_volume);
 }
 
-  module.def("found_levelling", &level_found);
+std::optional<double> resolution_at(const ShellCorrelation& curve, const py::object& threshold) {
+  if (!py::isinstance<py::float_>(threshold) && !py::isinstance<py::int_>(threshold))
+    throw py::type_error("the threshold is a number, not " +
+                         py::repr(threshold).cast<std::string>());
+  return resolution_A(curve, threshold.cast<double>());
+}
+
 void add_evaluate(py::module_& module) {
   py::class_<VolumeScores>(module, "VolumeScores", "How alike a volume is to the truth.")
-  module.def("export_particles", &cut_particles);
       .def_readonly("psnr_raw_dB", &VolumeScores::psnr_raw_dB)
       .def_readonly("psnr_affine_dB", &VolumeScores::psnr_affine_dB,
                     "after the best scale and offset")
@@ -331,7 +338,7 @@ void add_evaluate(py::module_& module) {
       .def_readonly("frequency_per_A", &ShellCorrelation::frequency_per_A)
       .def_readonly("correlation", &ShellCorrelation::correlation)
       .def_readonly("voxels", &ShellCorrelation::voxels)
-      .def("resolution_A", &resolution_A, py::arg("threshold") = 0.143,
+      .def("resolution_A", &resolution_at, py::arg("threshold") = 0.143,
            "Return where the correlation first falls below a threshold, in Å, or None.");
   module.def("score_volume", [](const py::object& volume, const py::object& truth) {
     const Tomogram a = to_tomogram(volume, 1.0), b = to_tomogram(truth, 1.0);

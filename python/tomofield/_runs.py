@@ -8,18 +8,19 @@ from typing import Any, Dict, List, Literal, Mapping, Optional, Sequence, Tuple,
 import numpy.typing as npt
 
 from . import _core
+from ._checks import Path, chosen
 from ._core import Error
 from ._progress import Callback, watched
-from ._projects import Project, Setting, chosen, open_project
+from ._projects import Project, Setting, open_project
 from ._records import Record, record_of
-from ._volumes import Model, Path, Tomogram
+from ._volumes import Model, Tomogram
 from .options import Options
 
 Source = Union[Path, Project, npt.ArrayLike]
 Watch = Union[Callback, bool, None]
-
 Method = Literal["wbp", "sirt", "sart-tv", "tv", "ingp", "fourier-net"]
 MethodOption = Union[str, float, bool]
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Reconstruction:
@@ -135,7 +136,6 @@ def baseline(source: Source, method: Method = "wbp", tilt_deg: Optional[Sequence
     if method not in methods:
         raise Error(f"the method is one of {', '.join(map(repr, methods))}, not {method!r}")
     choices, core = _inputs(source, tilt_deg, series, options)
-    with watched(progress) as callback:
     if method_options is not None and not isinstance(method_options, Mapping):
         raise TypeError("method_options are names with values, as {'iterations': 80}, not "
                         f"{method_options!r}")
@@ -163,7 +163,6 @@ def align(source: Source, tilt_deg: Optional[Sequence[float]] = None, *, series:
         return _core.align(core, choices, callback)
 
 
-def _run(choices: _core.Choices, core: _core.TiltSeries, progress: Watch) -> Reconstruction:
 def _text_of(value: MethodOption) -> str:
     """Return the value of a method's option as the command line takes it."""
     if isinstance(value, bool):
@@ -171,6 +170,7 @@ def _text_of(value: MethodOption) -> str:
     return str(value)
 
 
+def _run(choices: _core.Choices, core: _core.TiltSeries, progress: Watch) -> Reconstruction:
     with watched(progress) as callback:
         made = _core.reconstruct(core, choices, callback)
     if not made["is_finished"]:
@@ -182,6 +182,9 @@ def _text_of(value: MethodOption) -> str:
 
 def _inputs(source: Any, tilt_deg: Optional[Sequence[float]], series: str,
             given: Mapping[str, object]) -> Tuple[_core.Choices, _core.TiltSeries]:
+    if source is None or isinstance(source, (bool, int, float, complex, Mapping)):
+        raise TypeError("a series is the path of a stack or of a project, a tomofield.Project, or an "
+                        f"array [view, y, x], not {source!r}")
     if isinstance(source, (str, os.PathLike)):
         source = open_project(source, series=series, ignore=str(given.get("ignore", "")))
     elif series:
