@@ -37,7 +37,8 @@ const std::string kAreTomo =
     "# AreTomo Alignment\n# RawSize = 24 20 5\n# NumPatches = 1\n# DarkFrame = 1 1 -20\n"
     "# AlphaOffset = 1.5\n# BetaOffset = 0.25\n"
     "0 5 1.0 1 -2 nan 1 1 0 -40\n2 5 1.0 1 -2 1 1 1 0 0\n3 5 1.0 1 -2 1 1 1 0 20\n"
-    "4 5 1.0 1 -2 1 1 1 0 40\n# Local Alignment\n0 0 1.0 2.0 0.1 0.2 1.0\n";
+    "4 5 1.0 1 -2 1 1 1 0 40\n# Local Alignment\n0 0 1.0 2.0 0.1 0.2 1.0\n"
+    "1 0 1.0 2.0 0.1 0.2 1.0\n2 0 1.0 2.0 0.1 0.2 1.0\n3 0 1.0 2.0 0.1 0.2 1.0\n";
 const std::string kTable =
     "stack,path2,thickness,\"a \"\"b\"\"\"\r\n/dev/null,true,\"1,2\",\n\n/,, 5 ,false\n";
 const std::string kMdoc =

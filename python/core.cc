@@ -168,24 +168,60 @@ py::dict run(const TiltSeries& series, const option_table::Choices& choices, py:
 }
 
 py::dict run_baseline(const TiltSeries& series, BaselineMethod method,
-                      const option_table::Choices& choices, py::object callback) {
+                      const option_table::Choices& choices, const MethodOptions& method_options,
+                      py::object callback) {
   const Listener listener(std::move(callback));
   Baseline made;
   {
     const Unlocked unlocked;
-    made = reconstruct_baseline(series, method, choices.options, listener.callback());
+    made =
+        reconstruct_baseline(series, method, choices.options, method_options, listener.callback());
   }
   py::dict result;
   result["is_finished"] = made.is_finished;
   result["metrics"] = made.metrics;
-  result["tomogram"] = to_tuple(std::move(made.tomogram));
+  result["tomogram"] = py::none();
+  if (made.tomogram) result["tomogram"] = to_tuple(std::move(*made.tomogram));
   return result;
 }
 
-void export_box(const Model& model, const SampleBox& box, const std::filesystem::path& path,
-                const option_table::Choices& choices) {
+// Angles as Python has them: (pitch, x_tilt).
+std::optional<Levelling> levelling_of(const std::optional<std::pair<double, double>>& level) {
+  if (!level) return std::nullopt;
+  return Levelling{.pitch_deg = level->first, .x_tilt_deg = level->second};
+}
+
+VolumeFile file_of(const std::filesystem::path& path, const option_table::Choices& choices) {
+  return {path, choices.options.volume, choices.options.run.overwrite};
+}
+
+std::pair<double, double> level_found(const Model& model) {
   const Unlocked unlocked;
-  export_volume(model, box, {path, choices.options.volume, choices.options.run.overwrite});
+  const Levelling found = found_levelling(model);
+  return {found.pitch_deg, found.x_tilt_deg};
+}
+
+void export_box(const Model& model, const std::optional<SampleBox>& box, double voxel_px,
+                const std::optional<std::pair<double, double>>& level,
+                const std::filesystem::path& path, const option_table::Choices& choices) {
+  const Unlocked unlocked;
+  export_volume(model, {.box = box, .voxel_px = voxel_px, .level = levelling_of(level)},
+                file_of(path, choices));
+}
+
+std::pair<std::size_t, std::size_t> cut_particles(
+    const Model& model, const std::filesystem::path& list, std::int64_t size, double voxel_px,
+    const std::string& tomogram, const std::optional<std::pair<double, double>>& level,
+    const std::filesystem::path& path, const option_table::Choices& choices) {
+  const Unlocked unlocked;
+  const auto [count, num_beyond] = export_particles(model,
+                                                    {.list = list,
+                                                     .size = size,
+                                                     .voxel_px = voxel_px,
+                                                     .tomogram = tomogram,
+                                                     .level = levelling_of(level)},
+                                                    file_of(path, choices));
+  return {count, num_beyond};
 }
 
 py::tuple read_volume(const std::filesystem::path& path) {
@@ -247,7 +283,9 @@ void add_reconstruct(py::module_& module) {
       .value("wbp", BaselineMethod::kWbp)
       .value("sirt", BaselineMethod::kSirt)
       .value("sart-tv", BaselineMethod::kSartTv)
-      .value("tv", BaselineMethod::kTv);
+      .value("tv", BaselineMethod::kTv)
+      .value("ingp", BaselineMethod::kIngp)
+      .value("fourier-net", BaselineMethod::kFourierNet);
   module.def("open_project", &open);
   module.def("align", &align_series);
   module.def("reconstruct", &run);
@@ -271,9 +309,18 @@ void add_model(py::module_& module) {
       .def("region", &Model::region)
       .def("sample", &sample)
       .def("sample_points", &sample_points);
+  module.def("found_levelling", &level_found);
   module.def("export_box", &export_box);
+  module.def("export_particles", &cut_particles);
   module.def("read_mrc", &read_volume);
   module.def("write_mrc", &write_volume);
+}
+
+std::optional<double> resolution_at(const ShellCorrelation& curve, const py::object& threshold) {
+  if (!py::isinstance<py::float_>(threshold) && !py::isinstance<py::int_>(threshold))
+    throw py::type_error("the threshold is a number, not " +
+                         py::repr(threshold).cast<std::string>());
+  return resolution_A(curve, threshold.cast<double>());
 }
 
 void add_evaluate(py::module_& module) {
@@ -291,7 +338,7 @@ void add_evaluate(py::module_& module) {
       .def_readonly("frequency_per_A", &ShellCorrelation::frequency_per_A)
       .def_readonly("correlation", &ShellCorrelation::correlation)
       .def_readonly("voxels", &ShellCorrelation::voxels)
-      .def("resolution_A", &resolution_A, py::arg("threshold") = 0.143,
+      .def("resolution_A", &resolution_at, py::arg("threshold") = 0.143,
            "Return where the correlation first falls below a threshold, in Å, or None.");
   module.def("score_volume", [](const py::object& volume, const py::object& truth) {
     const Tomogram a = to_tomogram(volume, 1.0), b = to_tomogram(truth, 1.0);

@@ -5,12 +5,16 @@
 #include <tomofield/error.h>
 
 #include <array>
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "base/enum_names.h"
+#include "base/nearest_names.h"
 #include "option_table/rows.h"
 
 namespace tomofield::python {
@@ -102,6 +106,25 @@ void add_property(py::class_<Choices>& choices, const Row& row, Reference<Choice
   add_optional<T>(choices, row, member);
 }
 
+// Returns the names in Python of the options that are most like an unknown one: by these names, or
+// else by their flags.
+std::vector<std::string> nearest_options(const std::string& unknown) {
+  std::vector<std::string> names, flags;
+  std::map<std::string, std::string> name_of_flag;
+  for (const Row& row : option_table::all_rows()) {
+    if (row.name == "stack") continue;  // is no option in Python
+    std::string_view flag = option_table::flag_of(row.key);
+    flag.remove_prefix(flag.find_first_not_of('-'));
+    names.emplace_back(row.name);
+    if (name_of_flag.emplace(flag, row.name).second) flags.emplace_back(flag);
+  }
+  std::vector<std::string> nearest = base::nearest_names(unknown, names);
+  if (!nearest.empty()) return nearest;
+  for (const std::string& flag : base::nearest_names(unknown, flags))
+    nearest.push_back(name_of_flag.at(flag));
+  return nearest;
+}
+
 }  // namespace
 
 void add_options(py::module_& module) {
@@ -120,6 +143,7 @@ void add_options(py::module_& module) {
     if (row.section == "files") files.append(std::string(row.name));
   }
   module.attr("FILES") = py::tuple(files);
+  module.def("nearest_options", &nearest_options);
 }
 
 }  // namespace tomofield::python

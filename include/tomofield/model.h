@@ -23,6 +23,13 @@ struct SampleBox {
   std::array<double, 3> euler_deg{};
 };
 
+/// The angles that bring a specimen level, as options of a reconstruction would (`--tilt-offset`,
+/// `--x-axis-tilt`).
+struct Levelling {
+  double pitch_deg = 0.0;   ///< is added to all tilt angles
+  double x_tilt_deg = 0.0;  ///< is subtracted from the x-axis tilts of all views
+};
+
 /// A density field that reconstruct() fitted, in memory or read from a model file (.h5). Cheap to
 /// copy; a copy shares the field. Everything is const and may be called from several threads,
 /// except the constructor, which reads one file at a time.

@@ -11,6 +11,7 @@ from typing import Optional
 import numpy.typing as npt
 
 from . import _core
+from ._checks import whole_number_of
 from ._core import Error, Progress, ShellCorrelation, VolumeScores, __version__
 from ._projects import Project, Setting, open_project
 from ._records import Record, read_metrics, read_record
@@ -42,7 +43,7 @@ def correlate_shells(first: npt.ArrayLike, second: npt.ArrayLike,
 def set_thread_count(count: int) -> None:
     """Compute with this many threads. 0, the default: OMP_NUM_THREADS, or else the processors that
     this process may use."""
-    _core.set_thread_count(count)
+    _core.set_thread_count(whole_number_of(count, "the number of threads"))
 
 
 for _name in __all__:  # messages and help call them by the names that users know

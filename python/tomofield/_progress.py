@@ -19,6 +19,8 @@ def watched(progress: Union[Callback, bool, None]) -> Iterator[Optional[Callback
     progress: a callback; True for a bar, False for none; None for a bar in notebooks alone.
     """
     if progress is not None and not isinstance(progress, bool):
+        if not callable(progress):
+            raise TypeError(f"progress is a function, True, False or None, not {progress!r}")
         yield progress
         return
     tqdm = _tqdm() if progress or (progress is None and in_notebook()) else None

@@ -1,13 +1,11 @@
 """Projects of other programs."""
 
-import difflib
 import html
-import os
 import pathlib
-from typing import Any, List, Mapping, NamedTuple
+from typing import Any, List, NamedTuple
 
 from . import _core
-from ._volumes import Path
+from ._checks import Path, chosen, no_option, path_of, text_of
 from .options import Options
 
 
@@ -53,7 +51,7 @@ class Project:
     def __getattr__(self, name: str) -> Any:
         """Return the value of an option, or None if nobody chose it."""
         if name.startswith("_") or name not in {"stack", *Options.__annotations__}:
-            raise AttributeError(_no_option(name))
+            raise AttributeError(no_option(name))
         return getattr(self._core, name)
 
     def __repr__(self) -> str:
@@ -75,22 +73,5 @@ def open_project(path: Path, *, series: str = "", ignore: str = "") -> Project:
     series: the name of one series of a project that has several.
     ignore: entries of its files that are not applied, as in "LOCALFILE,LOG".
     """
-    return Project(*_core.open_project(os.fspath(path), series, ignore))
-
-
-def chosen(choices: _core.Choices, given: Mapping[str, object]) -> _core.Choices:
-    """Set options among compiled choices, and return these."""
-    for name, value in given.items():
-        if name not in Options.__annotations__:
-            raise TypeError(_no_option(name))
-        try:
-            setattr(choices, name, value)
-        except TypeError:
-            raise TypeError(f"the option {name} cannot be {value!r}") from None
-    return choices
-
-
-def _no_option(name: str) -> str:
-    """Return a sentence with the option whose name is most like this one, if there is one."""
-    nearest = difflib.get_close_matches(name, Options.__annotations__, n=1)
-    return f"there is no option '{name}'" + "".join(f" (did you mean {it}?)" for it in nearest)
+    return Project(*_core.open_project(path_of(path, "the project"), text_of(series, "series"),
+                                       text_of(ignore, "ignore")))

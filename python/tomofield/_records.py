@@ -5,9 +5,9 @@ import pathlib
 from dataclasses import dataclass, field
 from typing import Any, Dict, List
 
+from ._checks import Path, path_of
 from ._core import Error
 from ._projects import Setting
-from ._volumes import Path
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def record_of(text: str) -> Record:
 
 def read_record(path: Path) -> Record:
     """Return the record of a run from its .json file, or from the one beside a tomogram."""
-    file = pathlib.Path(path).with_suffix(".json")
+    file = pathlib.Path(path_of(path, "the record")).with_suffix(".json")
     try:
         return record_of(file.read_text(encoding="utf-8"))
     except OSError as error:

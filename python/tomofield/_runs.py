@@ -8,15 +8,18 @@ from typing import Any, Dict, List, Literal, Mapping, Optional, Sequence, Tuple,
 import numpy.typing as npt
 
 from . import _core
+from ._checks import Path, chosen
 from ._core import Error
 from ._progress import Callback, watched
-from ._projects import Project, Setting, chosen, open_project
+from ._projects import Project, Setting, open_project
 from ._records import Record, record_of
-from ._volumes import Model, Path, Tomogram
+from ._volumes import Model, Tomogram
 from .options import Options
 
 Source = Union[Path, Project, npt.ArrayLike]
 Watch = Union[Callback, bool, None]
+Method = Literal["wbp", "sirt", "sart-tv", "tv", "ingp", "fourier-net"]
+MethodOption = Union[str, float, bool]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -116,25 +119,34 @@ def denoise(made: Reconstruction, strength: Union[str, float], *, output: Path =
     return _run(settled, core, progress)
 
 
-def baseline(source: Source, method: Literal["wbp", "sirt", "sart-tv", "tv"] = "wbp",
-             tilt_deg: Optional[Sequence[float]] = None, *, series: str = "",
+def baseline(source: Source, method: Method = "wbp", tilt_deg: Optional[Sequence[float]] = None, *,
+             method_options: Optional[Mapping[str, MethodOption]] = None, series: str = "",
              progress: Watch = None, **options: Unpack[Options]) -> Reconstruction:
-    """Reconstruct by another method, to compare with, as `tomofield baseline` does by default.
+    """Reconstruct by another method, to compare with, as `tomofield baseline` does.
 
     method: weighted back-projection, simultaneous iterative reconstruction, ordered subsets with
-        total variation, or least squares with total variation.
-    The other arguments are those of reconstruct(), but for `output`: the result stays in memory,
-    and Tomogram.write() writes it. Options of the field have no effect.
+        total variation, least squares with total variation, a network with a hash grid, or a
+        network of plane waves.
+    method_options: what `tomofield baseline METHOD --help` lists under "Method", and ctf_correction:
+        {"iterations": 80, "penalty": "concave", "non_negative": False}.
+    The other arguments are those of reconstruct(). With `output`, the tomogram, its metrics and its
+    pictures are written as files. Options of the field have no effect.
     """
     methods = _core.BaselineMethod.__members__
     if method not in methods:
         raise Error(f"the method is one of {', '.join(map(repr, methods))}, not {method!r}")
     choices, core = _inputs(source, tilt_deg, series, options)
+    if method_options is not None and not isinstance(method_options, Mapping):
+        raise TypeError("method_options are names with values, as {'iterations': 80}, not "
+                        f"{method_options!r}")
+    own = {str(name).replace("_", "-"): _text_of(value)
+           for name, value in (method_options or {}).items()}
     with watched(progress) as callback:
-        made = _core.baseline(core, methods[method], choices, callback)
+        made = _core.baseline(core, methods[method], choices, own, callback)
     if not made["is_finished"]:
         return Reconstruction(False, None, None, Record())
-    return Reconstruction(True, Tomogram(*made["tomogram"]), None, record_of(made["metrics"]))
+    return Reconstruction(True, None if made["tomogram"] is None else Tomogram(*made["tomogram"]),
+                          None, record_of(made["metrics"]))
 
 
 def align(source: Source, tilt_deg: Optional[Sequence[float]] = None, *, series: str = "",
@@ -151,6 +163,13 @@ def align(source: Source, tilt_deg: Optional[Sequence[float]] = None, *, series:
         return _core.align(core, choices, callback)
 
 
+def _text_of(value: MethodOption) -> str:
+    """Return the value of a method's option as the command line takes it."""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return str(value)
+
+
 def _run(choices: _core.Choices, core: _core.TiltSeries, progress: Watch) -> Reconstruction:
     with watched(progress) as callback:
         made = _core.reconstruct(core, choices, callback)
@@ -163,6 +182,9 @@ def _run(choices: _core.Choices, core: _core.TiltSeries, progress: Watch) -> Rec
 
 def _inputs(source: Any, tilt_deg: Optional[Sequence[float]], series: str,
             given: Mapping[str, object]) -> Tuple[_core.Choices, _core.TiltSeries]:
+    if source is None or isinstance(source, (bool, int, float, complex, Mapping)):
+        raise TypeError("a series is the path of a stack or of a project, a tomofield.Project, or an "
+                        f"array [view, y, x], not {source!r}")
     if isinstance(source, (str, os.PathLike)):
         source = open_project(source, series=series, ignore=str(given.get("ignore", "")))
     elif series:

@@ -1,6 +1,5 @@
 """Volumes in memory and on disk, models, and boxes of them."""
 
-import os
 from dataclasses import dataclass
 from typing import Any, Literal, Optional, Tuple, Union
 
@@ -8,12 +7,13 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core, _pictures
+from ._checks import Path, chosen, number_of, path_of, text_of, whole_number_of
 from ._core import Error
 
-Path = Union[str, "os.PathLike[str]"]
 Array = npt.NDArray[np.float32]
 Numbers = Tuple[float, float, float]
 Axis = Literal["x", "y", "z"]
+Level = Union[Literal["found"], Tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ class Model:
 
     def __init__(self, path: Path) -> None:
         """Read a model file."""
-        self._core = _core.Model(os.fspath(path))
+        self._core = _core.Model(path_of(path, "a model's file"))
 
     @classmethod
     def _of(cls, core: _core.Model) -> "Model":
@@ -111,7 +111,7 @@ class Model:
 
     def region(self, voxel_px: float = 1.0) -> Box:
         """Return the region of interest, in whole voxels of voxel_px pixels."""
-        box = self._core.region(voxel_px)
+        box = self._core.region(number_of(voxel_px, "voxel_px"))
         return _box_of(box)
 
     def sample(self, box: Box) -> Array:
@@ -128,7 +128,13 @@ class Model:
         return Tomogram(self.sample(box), box.voxel_px * self.pixel_size_A)
 
     def _region_of(self, voxel_size_A: Optional[float]) -> Box:
-        return self.region(1.0 if voxel_size_A is None else voxel_size_A / self.pixel_size_A)
+        return self.region(self._voxel_px(voxel_size_A))
+
+    def _voxel_px(self, voxel_size_A: Optional[float]) -> float:
+        """Return the side of voxels in pixels, by default that of a pixel."""
+        if voxel_size_A is None:
+            return 1.0
+        return number_of(voxel_size_A, "voxel_size_A") / self.pixel_size_A
 
     def _size(self) -> str:
         sides = " × ".join(str(side) for side in self.region().size)
@@ -145,35 +151,56 @@ class Model:
                                 f"Model of {self._size()}: the middle XY section")
 
 
-def export(model: Union[Model, Path], output: Path, *, box: Optional[Box] = None,
-           voxel_size_A: Optional[float] = None,
+def export(model: Union[Model, Path], output: Path, *, box: Union[Box, int, None] = None,
+           voxel_size_A: Optional[float] = None, level: Optional[Level] = None,
+           particles: Optional[Path] = None, tomogram: str = "",
            voxel_type: Literal["float32", "float16", "int16"] = "float32",
            axes: Literal["xyz", "xzy"] = "xyz", invert: bool = False, zarr: bool = False,
            zarr_version: Literal["0.4", "0.5"] = "0.4", overwrite: bool = False) -> None:
-    """Write a box of a model as an MRC volume, as `tomofield export` does.
+    """Write a box or the particles of a model as an MRC file, as `tomofield export` does.
 
     model: a model, or the path of its file.
-    output: the volume to write, NAME.mrc.
-    box: any box; by default the region of interest with voxels of voxel_size_A.
+    output: the volume to write, NAME.mrc. Particles are a stack of volumes, and NAME.star is their
+        list.
+    box: any box; by default the region of interest with voxels of voxel_size_A. With particles, the
+        side of the cube of each in voxels.
     voxel_size_A: side of its voxels in Å; by default that of the model's pixels.
+    level: turns a specimen that lies aslant back: "found" takes what the alignment before the fit
+        found, from NAME_align.json beside the model; (pitch, x_tilt) are degrees. A box then lies
+        in the levelled volume.
+    particles: a list whose particles are cut out: a STAR file of RELION 5, or the text of
+        model2point.
+    tomogram: whose particles to take from a list of several tomograms; by default those of the
+        model's name.
     voxel_type, axes, invert, zarr, zarr_version, overwrite: as in tomofield.Options.
     """
     if not isinstance(model, Model):
         model = Model(model)
+    choices = chosen(_core.Choices(), {"voxel_type": voxel_type, "axes": axes, "invert": invert,
+                                       "zarr": zarr, "zarr_version": zarr_version,
+                                       "overwrite": overwrite})
+    file = path_of(output, "the output")
+    angles = _angles(model, level)
+    voxel_px = model._voxel_px(voxel_size_A)
+    if particles is not None:
+        side = whole_number_of(box, "box, the side of the cubes of particles in voxels,")
+        _core.export_particles(model._core, path_of(particles, "the list of particles"), side,
+                               voxel_px, text_of(tomogram, "tomogram"), angles, file, choices)
+        return
+    if tomogram:
+        raise Error("tomogram names the particles that are taken: give their list with particles")
+    if box is not None and not isinstance(box, Box):
+        raise TypeError(f"box is a tomofield.Box, not {box!r}; a side alone is for particles")
     if box is not None and voxel_size_A is not None:
         raise Error("box states the size of its voxels (voxel_px): leave voxel_size_A out")
-    choices = _core.Choices()
-    for name, value in (("voxel_type", voxel_type), ("axes", axes), ("invert", invert),
-                        ("zarr", zarr), ("zarr_version", zarr_version), ("overwrite", overwrite)):
-        setattr(choices, name, value)
-    chosen = model._region_of(voxel_size_A) if box is None else box
-    _core.export_box(model._core, _core_box(chosen), os.fspath(output), choices)
+    _core.export_box(model._core, None if box is None else _core_box(box), voxel_px, angles, file,
+                     choices)
 
 
 def read_mrc(path: Path) -> Tomogram:
     """Return the values of an MRC file: a volume, or a tilt series as [view, y, x]. The size of a
     voxel is 0 if the file does not state it."""
-    return Tomogram(*_core.read_mrc(os.fspath(path)))
+    return Tomogram(*_core.read_mrc(path_of(path, "a volume's file")))
 
 
 def write_mrc(path: Path, volume: npt.ArrayLike, voxel_size_A: Optional[float] = None, *,
@@ -182,17 +209,32 @@ def write_mrc(path: Path, volume: npt.ArrayLike, voxel_size_A: Optional[float] =
 
     voxel_size_A: side of a voxel in Å, which an array needs and a Tomogram has.
     """
-    _core.write_mrc(volume, _voxel_size(voxel_size_A, volume), os.fspath(path), overwrite)
+    _core.write_mrc(volume, _voxel_size(voxel_size_A, volume), path_of(path, "the output"),
+                    bool(overwrite))
 
 
 def _voxel_size(given: Optional[float], *volumes: Any) -> float:
     """Return the size of a voxel: the one that is given, or that of the first Tomogram."""
     if given is not None:
-        return given
+        return number_of(given, "voxel_size_A")
     for volume in volumes:
         if isinstance(volume, Tomogram):
             return volume.voxel_size_A
     raise Error("an array does not say how large its voxels are: give voxel_size_A, in Å")
+
+
+def _angles(model: Model, level: Optional[Level]) -> Optional[Tuple[float, float]]:
+    """Return the angles that bring a specimen level, or None."""
+    if level is None:
+        return None
+    if isinstance(level, str) and level == "found":
+        return _core.found_levelling(model._core)
+    try:
+        pitch, x_tilt = level
+        return float(pitch), float(x_tilt)
+    except (TypeError, ValueError):
+        raise TypeError(f"level is 'found' or two angles in degrees, (pitch, x_tilt), not {level!r}"
+                        ) from None
 
 
 def _axis_number(axis: str) -> int:
@@ -207,4 +249,10 @@ def _box_of(core: _core.SampleBox) -> Box:
 
 
 def _core_box(box: Box) -> _core.SampleBox:
-    return _core.SampleBox(box.centre_px, box.size, box.voxel_px, box.euler_deg)
+    if not isinstance(box, Box):
+        raise TypeError(f"a box is a tomofield.Box, not {box!r}")
+    try:
+        return _core.SampleBox(box.centre_px, box.size, box.voxel_px, box.euler_deg)
+    except TypeError:
+        raise TypeError("a box has three numbers in centre_px and in euler_deg, three whole numbers "
+                        f"in size, and a number in voxel_px: not {box!r}") from None

@@ -102,6 +102,11 @@ json series_json(const AlignmentOrigin& origin) {
           {"pixels", origin.pixels}};
 }
 
+std::string size_text(const AlignmentOrigin& series) {
+  return fmt::format("{} sections of {} × {} pixels", series.num_sections, series.size_px[0],
+                     series.size_px[1]);
+}
+
 // ----------------------------------------------------------------- reading
 
 // Returns the part of an object under `key`.
@@ -223,24 +228,6 @@ AlignedView view_from(const json& object, const std::optional<LocalRecord>& loca
   return view;
 }
 
-AlignmentOrigin origin_from(const json& json) {
-  constexpr double kLargestSize_px = 1 << 30;
-  const auto& series = part(json, "series");
-  const std::array<double, 2> size_px = pair_at(series, "size_px", 1, kLargestSize_px);
-  AlignmentOrigin origin{
-      .num_sections = io::integer_at(series, "sections", 1, 1 << 30),
-      .size_px = {static_cast<std::int64_t>(size_px[0]), static_cast<std::int64_t>(size_px[1])},
-      .files = {},
-      .header_tilts = text_at(series, "header_tilts"),
-      .pixels = text_at(series, "pixels"),
-      .made_with = part(json, "made_with")};
-  const auto& files = part(series, "files");
-  if (!files.is_object()) throw Error("'files' is no object");
-  for (const auto& file : files.items())
-    origin.files[file.key()] = text_at(files, file.key().c_str());
-  return origin;
-}
-
 std::vector<AlignedView> views_from(const json& views, const AlignmentRecord& record) {
   if (!views.is_array() || views.empty()) throw Error("it has no 'views'");
   std::vector<AlignedView> all;
@@ -304,18 +291,56 @@ void add_left_out(const tilt_series::PlannedSeries& series, const Alignment& fir
   std::ranges::stable_sort(record.views, {}, &AlignedView::section);
 }
 
+json to_json(const AlignmentOrigin& origin) {
+  return {{"made_with", origin.made_with}, {"series", series_json(origin)}};
+}
+
+AlignmentOrigin origin_from(const json& json) {
+  constexpr double kLargestSize_px = 1 << 30;
+  const auto& series = part(json, "series");
+  const std::array<double, 2> size_px = pair_at(series, "size_px", 1, kLargestSize_px);
+  AlignmentOrigin origin{
+      .num_sections = io::integer_at(series, "sections", 1, 1 << 30),
+      .size_px = {static_cast<std::int64_t>(size_px[0]), static_cast<std::int64_t>(size_px[1])},
+      .files = {},
+      .header_tilts = text_at(series, "header_tilts"),
+      .pixels = text_at(series, "pixels"),
+      .made_with = part(json, "made_with")};
+  const auto& files = part(series, "files");
+  if (!files.is_object()) throw Error("'files' is no object");
+  for (const auto& file : files.items())
+    origin.files[file.key()] = text_at(files, file.key().c_str());
+  return origin;
+}
+
+std::string text_of(const AlignmentOrigin& origin) { return to_json(origin).dump(); }
+
+AlignmentOrigin origin_from_text(const std::string& text) {
+  return origin_from(io::parse_json(text));
+}
+
+std::string difference_of(const AlignmentOrigin& found, const AlignmentOrigin& wanted) {
+  if (size_text(found) != size_text(wanted))
+    return fmt::format("it is of a series of {}, and this one has {}", size_text(found),
+                       size_text(wanted));
+  AlignmentOrigin series = found;
+  series.made_with = wanted.made_with;
+  if (series != wanted)
+    return "it was made from another series: its images or its files are not the same";
+  return found.made_with != wanted.made_with ? "it was made with other options" : "";
+}
+
 json to_json(const AlignmentRecord& record) {
   json views = json::array();
   for (const AlignedView& view : record.views) views.push_back(view_json(view));
-  json object = {{"made_with", record.origin.made_with},
-                 {"series", series_json(record.origin)},
-                 {"accepted", record.is_accepted},
+  json object = to_json(record.origin);
+  object.update({{"accepted", record.is_accepted},
                  {"rotation", record.freedoms.rotation},
                  {"magnification", record.freedoms.magnification},
                  {"tilt", record.freedoms.tilt},
                  {"steps_px", record.steps_px},
                  {"seconds", record.seconds},
-                 {"views", std::move(views)}};
+                 {"views", std::move(views)}});
   write_comparison(record.held_out, object);
   if (record.pose) object["pose"] = pose_json(*record.pose);
   if (record.beads) object["beads"] = beads_json(*record.beads);

@@ -88,6 +88,18 @@ AlignmentRecord make_record(AlignmentOrigin origin, const tilt_series::PlannedSe
 void add_left_out(const tilt_series::PlannedSeries& series, const Alignment& first,
                   AlignmentRecord& record);
 
+/// Writes what an alignment is made from: the entries `series` and `made_with` of its record.
+nlohmann::json to_json(const AlignmentOrigin& origin);
+/// Reads it. Throws Error with what is wrong if no alignment could have written it.
+AlignmentOrigin origin_from(const nlohmann::json& json);
+std::string text_of(const AlignmentOrigin& origin);
+AlignmentOrigin origin_from_text(const std::string& text);
+
+/// Returns a sentence that says how an alignment's origin is another one than is wanted: "it was
+/// made from another series: its images or its files are not the same". It is empty if both are the
+/// same.
+std::string difference_of(const AlignmentOrigin& found, const AlignmentOrigin& wanted);
+
 /// Writes a record.
 nlohmann::json to_json(const AlignmentRecord& record);
 /// Reads a record that somebody may have changed. Throws Error with what is wrong if no alignment

@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <memory>
 #include <utility>
 
@@ -6,6 +7,7 @@
 #include "base/threads/parallel.h"
 #include "io/images/image_stack.h"
 #include "options/run_options.h"
+#include "output/output_paths.h"
 #include "output/public_model.h"
 #include "reconstruct/reconstruct.h"
 #include "record/run_record.h"
@@ -65,7 +67,11 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
                       .options = std::move(run.options)};
   if (options.run.output.empty())
     made.tomogram = output::sample_tomogram(*run.model, options.volume.invert);
-  if (run.model) made.model = ModelAccess::make(std::move(*run.model));
+  if (run.model) {
+    const std::filesystem::path& volume = options.run.output;
+    made.model = ModelAccess::make(std::move(*run.model),
+                                   volume.empty() ? volume : output::output_paths(volume).model);
+  }
   return made;
 }
 

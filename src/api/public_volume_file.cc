@@ -6,12 +6,12 @@
 
 #include "base/plausible.h"
 #include "base/system/memory.h"
+#include "exchange/model_export.h"
 #include "io/images/mrc.h"
 #include "io/saving/output_files.h"
 #include "io/saving/output_lock.h"
-#include "io/saving/output_set.h"
 #include "output/public_model.h"
-#include "output/volume.h"
+#include "output/volume_frame.h"
 #include "tomofield/error.h"
 #include "tomofield/version.h"
 #include "tomofield/volume_file.h"
@@ -29,15 +29,46 @@ std::vector<io::OutputLock> claim(const std::filesystem::path& path, bool overwr
   });
 }
 
+exchange::ExportFiles files_of(const Model& model, const VolumeFile& file) {
+  return {.output = file.path,
+          .model = ModelAccess::file(model),
+          .volume = file.options,
+          .overwrite = file.overwrite};
+}
+
 }  // namespace
 
-void export_volume(const Model& model, const SampleBox& box, const VolumeFile& file) {
-  const std::vector<io::OutputLock> locks = claim(file.path, file.overwrite);
-  if (file.options.zarr) output::check_zarr(file.path, file.overwrite, kAdvice);
-  io::OutputSet results;
-  output::write_volume(ModelAccess::model(model), file.options, file.path,
-                       {.box = oriented_box(box)});
-  results.commit();
+void export_volume(const Model& model, const VolumePlace& place, const VolumeFile& file) {
+  if (place.box && place.level && place.box->euler_deg != SampleBox{}.euler_deg)
+    throw Error("a box that has angles of its own cannot be levelled (--rotate, --level)");
+  const exchange::ExportFiles files = files_of(model, file);
+  const std::vector<io::OutputLock> locks = exchange::claim_export(files, kAdvice);
+  require_usable_voxels(place.voxel_px);
+  exchange::ExportPlace placed{.voxel_px = place.voxel_px, .level = place.level};
+  if (place.box) placed.box = oriented_box(*place.box);
+  const output::Model& field = ModelAccess::model(model);
+  exchange::export_volume(field, exchange::box_in_field(field, placed), files);
+}
+
+Levelling found_levelling(const Model& model) {
+  const std::filesystem::path& file = ModelAccess::file(model);
+  if (file.empty())
+    throw Error(
+        "a model in memory has no alignment beside it to level it by: give both angles in degrees "
+        "(--level PITCH,X_TILT)");
+  return output::found_levelling(ModelAccess::model(model), file);
+}
+
+CutParticles export_particles(const Model& model, const ParticleCuts& cuts,
+                              const VolumeFile& file) {
+  exchange::ExportFiles files = files_of(model, file);
+  files.particles = cuts.list;
+  const std::vector<io::OutputLock> locks = exchange::claim_export(files, kAdvice);
+  require_usable_voxels(cuts.voxel_px);
+  return exchange::export_particles(
+      ModelAccess::model(model),
+      {.size = cuts.size, .voxel_px = cuts.voxel_px, .levelling = cuts.level.value_or(Levelling{})},
+      cuts.tomogram, files);
 }
 
 Tomogram read_mrc(const std::filesystem::path& path) {

@@ -10,15 +10,30 @@
 
 namespace tomofield::base {
 
+/// A pattern of fmt::format() that the source states: a text of which the compiler does not know
+/// the letters does not become one.
+class LiteralPattern {
+ public:
+  template <std::size_t size>
+  consteval LiteralPattern(const char (&literal)[size])
+      : text_(literal) {}  // NOLINT: literals convert
+  constexpr std::string_view text() const { return text_; }
+
+ private:
+  std::string_view text_;
+};
+
 /// Text that a program obeys, such as the HTML of a page or a script of the shell. It is made of
-/// literals of the source, numbers, and words that Language::quoted() made harmless. A std::string,
-/// which may come from outside, does not become code unless of() quotes it.
+/// literals of the source, numbers, and words that Language::quoted() made harmless. A std::string
+/// or a buffer, which may come from outside, does not become code unless of() quotes it.
 template <typename Language>
 class CodeText {
  public:
   CodeText() = default;
   template <std::size_t size>
   CodeText(const char (&literal)[size]) : text_(literal) {}  // NOLINT: literals convert
+  template <std::size_t size>
+  CodeText(char (&buffer)[size]) = delete;
 
   /// Quotes a text, so that it stands for itself.
   static CodeText of(std::string_view outside) { return made(Language::quoted(outside)); }
@@ -29,10 +44,10 @@ class CodeText {
     return made;
   }
   /// Puts code and numbers into a literal, as fmt::format() does.
-  template <std::size_t size, typename... Parts>
+  template <typename... Parts>
   requires((std::is_same_v<Parts, CodeText> || std::is_arithmetic_v<Parts>)&&...) static CodeText
-      format(const char (&literal)[size], const Parts&... parts) {
-    return made(fmt::format(fmt::runtime(std::string_view(literal)), text_of(parts)...));
+      format(LiteralPattern pattern, const Parts&... parts) {
+    return made(fmt::format(fmt::runtime(pattern.text()), text_of(parts)...));
   }
 
   CodeText& operator+=(const CodeText& more) {

@@ -38,10 +38,13 @@ TEST(CodeText, IsNotMadeOfOtherTexts) {
   static_assert(!std::is_convertible_v<std::string_view, Code>);
   static_assert(!std::is_convertible_v<const char*, Code>);
   static_assert(!std::is_convertible_v<CodeText<Others>, Code>);
+  static_assert(!std::is_convertible_v<char(&)[8], Code>);  // a buffer
   static_assert(std::is_convertible_v<decltype("literal"), Code>);
 }
 
 TEST(CodeText, FormatsNoOtherTexts) {
+  static_assert(!std::is_convertible_v<const char*, LiteralPattern>);
+  static_assert(!std::is_convertible_v<std::string, LiteralPattern>);
   static_assert(CanBeFormatted<Code>);
   static_assert(CanBeFormatted<double>);
   static_assert(!CanBeFormatted<std::string>);

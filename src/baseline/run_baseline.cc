@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string>
 #include <utility>
+#include <variant>
 
 #include "base/check.h"
 #include "base/log.h"
@@ -17,6 +18,7 @@
 #include "baseline/voxel_problem.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_files.h"
+#include "io/saving/output_set.h"
 #include "io/saving/scratch_memory.h"
 #include "kernels/lanes.h"
 #include "measurement/ctf_correction.h"
@@ -31,6 +33,7 @@
 #include "output/public_model.h"
 #include "output/volume.h"
 #include "projection/sample_grid.h"
+#include "report/pictures.h"
 #include "tilt_series/series_plan.h"
 #include "tomofield/error.h"
 #include "tune/trial_measurement.h"
@@ -131,6 +134,18 @@ void write_volume(const Solution& solution, const measurement::Measurement& seri
                path);
 }
 
+// Writes the volume, the record and the pictures of a run, which appear together.
+void write_results(const Solution& solution, const measurement::Measurement& series,
+                   const tilt_series::TiltSeries& views, const BaselineOptions& options,
+                   const BaselineSummary& summary) {
+  const output::OutputPaths paths = output::output_paths(options.shared.run.output);
+  io::OutputSet results;
+  write_volume(solution, series, options, paths.volume);
+  io::write_text_file(paths.json, summary.record);
+  report::write_run_pictures(results.location_of(paths.volume), views, summary.bead_masking, paths);
+  results.commit();
+}
+
 // Prepares the views, and corrects their contrast transfer if the options have one.
 measurement::Measurement prepare(const tilt_series::TiltSeries& tilt_series,
                                  const BaselineOptions& options,
@@ -152,6 +167,16 @@ tilt_series::TiltSeriesOptions BaselineOptions::input() const {
   tilt_series::TiltSeriesOptions input = tilt_series::series_options(files, shared);
   input.images = images;
   return input;
+}
+
+void settle(BaselineOptions& options) {
+  const bool by_contrast = options.shared.views.contrast != Contrast::kDark;
+  std::visit(
+      [&](auto& method) {
+        if constexpr (requires { method.non_negative; })
+          method.non_negative = options.non_negative.value_or(by_contrast);
+      },
+      options.method);
 }
 
 void check_options(const BaselineOptions& options) {
@@ -257,10 +282,9 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
                                                  size.num_parameters, fit_seconds, tuned, errors})};
   if (options.shared.run.output.empty()) {
     summary.tomogram = tomogram_of(solution, series, options);
-  } else {
-    write_volume(solution, series, options, paths.volume);
-    io::write_text_file(paths.json, summary.record);
+    return summary;
   }
+  write_results(solution, series, tilt_series, options, summary);
   return summary;
 }
 

@@ -29,6 +29,9 @@ struct BaselineOptions {
   /// Corrects the views before, if there is a contrast transfer.
   microscope::CtfCorrection ctf_correction = microscope::CtfCorrection::kFlip;
 
+  /// Keeps densities at or above zero. Not given: settle() decides by the contrast.
+  std::optional<bool> non_negative = {};
+
   /// Returns whether the scales of views are fitted, which the contrast decides unless it is given.
   bool fits_view_scale() const;
   std::shared_ptr<const io::ImageStack> images = {};  ///< views in memory, in place of files.stack
@@ -36,6 +39,10 @@ struct BaselineOptions {
   /// Returns how the tilt series is read.
   tilt_series::TiltSeriesOptions input() const;
 };
+
+/// Gives the method what the contrast decides unless it is given: whether densities stay at or
+/// above zero. Call it before the functions below.
+void settle(BaselineOptions& options);
 
 /// Checks the options and the output files. Throws Error for options out of range, and if results
 /// would replace existing ones without `overwrite` or cannot be written. Without an output there
@@ -77,9 +84,9 @@ struct BaselineProgress {
 };
 
 /// Reads the series, tunes if the options ask for it, reconstructs, and writes the volume (MRC, in
-/// the input's units and contrast) and the metrics and resolved options (JSON). Without an output
-/// it returns the volume and writes nothing. Starts at once: call check_options() and
-/// plan_baseline() first. An exception of `progress` ends it.
+/// the input's units and contrast), the metrics and resolved options (JSON) and the pictures, all
+/// together. Without an output it returns the volume and writes nothing. Starts at once: call
+/// check_options() and plan_baseline() first. An exception of `progress` ends it.
 BaselineSummary run_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options,
                              const BaselineProgress& progress);
 

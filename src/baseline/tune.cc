@@ -214,6 +214,10 @@ Method tuned(Options options, TrialRuns& runs, Trials& trials) {
 
 }  // namespace
 
+bool is_tunable(const Method& method) {
+  return std::visit([]<typename M>(const M&) { return Tunable<M>; }, method);
+}
+
 Tuned tune(const Method& start, const TrialData& data, const base::ProgressSink& progress) {
   const base::TraceSpan span("trials");
   TrialRuns runs(data, progress);

@@ -23,6 +23,9 @@ concept HasCutoff = std::same_as<Options, WbpOptions>;
 template <typename Options>
 concept Tunable = HasWeight<Options> || StopsEarly<Options> || HasCutoff<Options>;
 
+/// Says whether tune() can choose something of a method.
+bool is_tunable(const Method& method);
+
 /// A method is the settings of its trials.
 using Trial = tune::Trial<Method>;
 using Tuned = tune::Tuned<Method>;

@@ -3,13 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <map>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "base/system/child_process.h"
 #include "batch/file_conflicts.h"
 #include "batch/series_list.h"
 #include "io/saving/output_folder.h"
+#include "tomofield/error.h"
 
 namespace tomofield::batch {
 namespace {
@@ -17,19 +21,56 @@ namespace {
 namespace fs = std::filesystem;
 using option_table::GivenOption;
 
-void replace_all(const std::string& mark, const std::string& text, std::string& value) {
-  for (std::size_t at = value.find(mark); at != std::string::npos;
-       at = value.find(mark, at + text.size()))
-    value.replace(at, mark.size(), text);
+// Says whether a text in braces is written like the name of a placeholder.
+bool is_word(std::string_view text) {
+  return !text.empty() && std::ranges::all_of(text, [](unsigned char c) {
+    return std::isalpha(c) != 0 || c == '_';
+  });
 }
 
-// Returns a common option with the names of a series in place of {name} and {folder}.
-GivenOption option_for(const Series& series, GivenOption option) {
-  if (!option.value) return option;
+// Returns a text with the names of a series in place of {name} and {folder}. Throws Error, with
+// what `where` says of the text, for another word in braces.
+std::string filled(const Series& series, const std::string& text, const std::string& where) {
   const fs::path folder = series.input.parent_path();
-  replace_all("{name}", series.input.stem().string(), *option.value);
-  replace_all("{folder}", folder.empty() ? "." : folder.string(), *option.value);
+  std::string result;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = text[at] == '{' ? text.find('}', at) : std::string::npos;
+    const std::string word = end == std::string::npos ? "" : text.substr(at + 1, end - at - 1);
+    if (word == "name") {
+      result += series_name(series.input);
+    } else if (word == "folder") {
+      result += folder.empty() ? "." : folder.string();
+    } else if (is_word(word)) {
+      throw Error(
+          fmt::format("{}: '{{{}}}' stands for nothing: {{name}} stands for the name of a "
+                      "series' file without its ending, {{folder}} for its folder",
+                      where, word));
+    } else {
+      result += text[at++];
+      continue;
+    }
+    at = end + 1;
+  }
+  return result;
+}
+
+GivenOption option_for(const Series& series, GivenOption option, const std::string& where) {
+  if (option.value) option.value = filled(series, *option.value, where);
   return option;
+}
+
+// Throws Error with every word in braces that stands for nothing in an option.
+void require_placeholders(const std::vector<Series>& all, const std::vector<GivenOption>& common) {
+  for (const GivenOption& option : common) option_for({}, option, option.flag);
+  Faults faults;
+  for (const Series& series : all) {
+    try {
+      command_of(series, {});
+    } catch (const Error& error) {
+      faults.add(error.what());
+    }
+  }
+  faults.require_none();
 }
 
 // Returns the words that check a job and write what it needs to `plan`.
@@ -66,7 +107,8 @@ class Stacks {
 }  // namespace
 
 fs::path output_of(const Series& series, const fs::path& folder) {
-  return series.output.empty() ? folder / (series.name + ".mrc") : series.output;
+  if (series.output.empty()) return folder / (series.name + ".mrc");
+  return filled(series, series.output.string(), series.source + ", output");
 }
 
 std::vector<std::string> command_of(const Series& series, const std::vector<GivenOption>& common) {
@@ -76,14 +118,16 @@ std::vector<std::string> command_of(const Series& series, const std::vector<Give
                                  (looks_like_option ? "." / series.input : series.input).string()};
   for (const GivenOption& option : common) {
     if (std::ranges::find(series.options, option.flag, &GivenOption::flag) == series.options.end())
-      words.push_back(option_for(series, option).word());
+      words.push_back(option_for(series, option, option.flag).word());
   }
-  for (const GivenOption& option : series.options) words.push_back(option.word());
+  for (const GivenOption& option : series.options)
+    words.push_back(option_for(series, option, series.source + ", " + option.flag).word());
   words.push_back("--output=" + series.output.string());
   return words;
 }
 
 JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
+  require_placeholders(all, options.common);
   const io::ScratchFolder scratch(options.folder, ".tomofield-plan");
   const fs::path plan = scratch.path() / "plan.json", log = scratch.path() / "log";
   Faults faults;

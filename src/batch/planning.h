@@ -15,14 +15,16 @@ struct PlanOptions {
   std::filesystem::path program;  ///< tomofield itself
   std::filesystem::path list;     ///< what names the series: a table, a STAR file or a pattern
   std::filesystem::path folder;   ///< of the batch; it exists
-  /// Options of all series, which an option of a series replaces. {name} in a value stands for the
-  /// name of a series' file without its ending, {folder} for its folder.
+  /// Options of all series, which an option of a series replaces.
   std::vector<option_table::GivenOption> common;
   int threads = 1;              ///< that a job may get at most
   bool skips_existing = false;  ///< leave finished series as they are, and continue others
   bool overwrites = false;
   std::function<bool()> stop_requested;
 };
+
+// In the values of options and in outputs, {name} stands for the name of a series' file without its
+// ending and {folder} for its folder. All functions throw Error for another word in braces.
 
 /// Returns where the tomogram of a series goes.
 std::filesystem::path output_of(const Series& series, const std::filesystem::path& folder);

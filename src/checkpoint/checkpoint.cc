@@ -208,6 +208,7 @@ output::ModelInfo model_info(const measurement::Measurement& series,
                              const options::ReconstructOptions& options) {
   output::ModelInfo info = output::model_info(series, options.views.contrast);
   info.options_json = options::options_text(options);
+  if (options.alignment) info.alignment_json = alignment::text_of(options.alignment->origin);
   return info;
 }
 

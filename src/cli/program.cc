@@ -20,8 +20,8 @@
 #include "cli/commands/commands.h"
 #include "cli/options/config_file.h"
 #include "cli/options/help_formatter.h"
+#include "cli/options/parse_fault.h"
 #include "cli/options/project_arguments.h"
-#include "cli/options/unknown_options.h"
 #include "cli/terminal/console.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -160,10 +160,10 @@ int run_command(CLI::App& program, std::vector<std::string> arguments,
     program.parse(last_first);
   } catch (const CLI::ParseError& error) {  // the same in all processes
     if (error.get_exit_code() != 0) {
-      const std::string unknown = fault_of_unknown_words(called_command(program), arguments);
-      throw distributed::SharedError(
-          fmt::format("{}; `{} {}` lists the options", unknown.empty() ? error.what() : unknown,
-                      command_name(program), help_flag_of(called_command(program))));
+      const CLI::App& command = called_command(program);
+      throw distributed::SharedError(fmt::format("{}; `{} {}` lists the options",
+                                                 parse_fault(command, arguments, error),
+                                                 command_name(program), help_flag_of(command)));
     }
     print_answer(program, error);
     return report_output(/*is_result=*/true);

@@ -157,6 +157,7 @@ class ModelReader {
     info.density_unit = root.number("density_unit", kLargestDensityUnit);
     info.is_dark = root.text("contrast") == "dark";
     info.options_json = root.text("options_json");
+    if (root.has_attribute("alignment_json")) info.alignment_json = root.text("alignment_json");
     info.written_by = root.text("written_by");
     read_geometry(root.group("geometry"), info);
   }

@@ -40,7 +40,9 @@ struct ModelInfo {
   double density_unit = 1.0;  ///< data units a density unit
   bool is_dark = false;       ///< dense was dark in the series, so volumes are negated
   std::string options_json;   ///< the resolved options of the reconstruction
-  std::string written_by;     ///< program and version; filled in by load_model
+  /// What the alignment before the fit was made from (alignment::to_json()); empty: there was none.
+  std::string alignment_json = {};
+  std::string written_by;  ///< program and version; filled in by load_model
   /// Returns the factor from densities to values of the input's units and contrast.
   double output_scale() const { return is_dark ? -density_unit : density_unit; }
 };

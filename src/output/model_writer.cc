@@ -131,6 +131,7 @@ void write_contents(Hdf5Group root, const ModelInfo& info, std::int64_t version,
   root.write_number("density_unit", info.density_unit);
   root.write_text("contrast", info.is_dark ? "dark" : "bright");
   root.write_text("options_json", info.options_json);
+  if (!info.alignment_json.empty()) root.write_text("alignment_json", info.alignment_json);
   write_geometry(root.create_group("geometry"), info);
   write_rest(root);
 }

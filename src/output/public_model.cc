@@ -18,13 +18,16 @@ namespace tomofield {
 
 struct Model::Impl {
   output::Model model;
+  std::filesystem::path file;  // empty in memory
 };
 
-Model ModelAccess::make(output::Model model) {
-  return Model(std::make_shared<Model::Impl>(Model::Impl{std::move(model)}));
+Model ModelAccess::make(output::Model model, std::filesystem::path file) {
+  return Model(std::make_shared<Model::Impl>(Model::Impl{std::move(model), std::move(file)}));
 }
 
 const output::Model& ModelAccess::model(const Model& model) { return model.impl_->model; }
+
+const std::filesystem::path& ModelAccess::file(const Model& model) { return model.impl_->file; }
 
 namespace {
 
@@ -44,6 +47,12 @@ void require_usable(const SampleBox& box) {
 }
 
 }  // namespace
+
+void require_usable_voxels(double voxel_px) {
+  if (!is_usable_voxel(voxel_px))
+    throw Error(
+        fmt::format("voxels of {} px cannot be sampled: give a finite size above 0", voxel_px));
+}
 
 field::OrientedBox oriented_box(const SampleBox& box) {
   require_usable(box);
@@ -75,14 +84,12 @@ Tomogram sample_tomogram(const output::Model& model, bool invert) {
 Model::Model(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 
 Model::Model(const std::filesystem::path& path)
-    : impl_(std::make_shared<Impl>(Impl{output::load_to_sample(path)})) {}
+    : impl_(std::make_shared<Impl>(Impl{output::load_to_sample(path), path})) {}
 
 double Model::pixel_size_A() const { return impl_->model.pixel_size_A; }
 
 SampleBox Model::region(double voxel_px) const {
-  if (!is_usable_voxel(voxel_px))
-    throw Error(
-        fmt::format("voxels of {} px cannot be sampled: give a finite size above 0", voxel_px));
+  require_usable_voxels(voxel_px);
   const field::OrientedBox box = output::region_box(impl_->model, voxel_px);
   SampleBox region{.centre_px = box.centre_px, .size = box.size, .voxel_px = box.voxel_px};
   // An x-axis tilt turns the box about X: these Euler angles have the same matrix.

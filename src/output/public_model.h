@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <vector>
 
 #include "field/sampling/sample_box.h"
@@ -11,13 +12,18 @@ namespace tomofield {
 
 /// Makes a public model, whose constructor is private.
 struct ModelAccess {
-  static Model make(output::Model model);
+  /// `file` is that of the model; empty: it is in memory alone.
+  static Model make(output::Model model, std::filesystem::path file);
   static const output::Model& model(const Model& model);
+  static const std::filesystem::path& file(const Model& model);
 };
 
 /// Returns a box of a public model as the field takes it. Throws Error for sizes below 1 and for
 /// numbers that are not finite.
 field::OrientedBox oriented_box(const SampleBox& box);
+
+/// Throws Error for a size of voxels that is not finite or not above 0.
+void require_usable_voxels(double voxel_px);
 
 namespace output {
 

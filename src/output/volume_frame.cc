@@ -1,10 +1,13 @@
 #include "output/volume_frame.h"
 
 #include <fmt/format.h>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "align/alignment_record.h"
+#include "base/log.h"
 #include "io/is_file.h"
 #include "output/output_paths.h"
 #include "tomofield/error.h"
@@ -47,24 +50,62 @@ double sure_angle(double angle_deg, double error_deg) {
   return std::abs(angle_deg) >= kSure * error_deg ? angle_deg : 0.0;
 }
 
+// Throws Error if an alignment is of another series than a model: it was made from something else
+// than the alignment before the fit, or has no view at an angle of the model.
+void require_own(const ModelInfo& model, const alignment::AlignmentRecord& record) {
+  constexpr double kSame_deg = 0.02;  // angles are written with some digits
+  if (!model.alignment_json.empty()) {
+    const auto own = alignment::origin_from_text(model.alignment_json);
+    if (const std::string why = alignment::difference_of(record.origin, own); !why.empty())
+      throw Error(fmt::format("{}, and the model was aligned by another one", why));
+    return;
+  }
+  for (const double tilt_deg : model.geometry.tilt_deg) {
+    const auto is_there = [&](const alignment::AlignedView& view) {
+      const double change_deg = tilt_deg - view.tilt_deg;
+      return std::abs(change_deg) <= kSame_deg ||
+             std::abs(change_deg - view.tilt_change_deg) <= kSame_deg;
+    };
+    if (std::ranges::none_of(record.views, is_there))
+      throw Error(fmt::format(
+          "it is of another series: the model has a view at {:.2f}°, and this alignment has none",
+          tilt_deg));
+  }
+}
+
+// Says which angles the alignment found, and warns if they are hard to believe.
+void tell_levelling(const Levelling& found) {
+  constexpr double kUsual_deg = 12.0;  // sections of frozen cells lie flatter
+  const std::string angles = fmt::format("a pitch of {:.1f}° and a tilt about X of {:.1f}°",
+                                         found.pitch_deg, found.x_tilt_deg);
+  base::log_info(fmt::format("levelled by {}; 0 is what the views are not sure of", angles));
+  if (std::abs(found.pitch_deg) > kUsual_deg || std::abs(found.x_tilt_deg) > kUsual_deg / 2)
+    base::log_warning(fmt::format(
+        "{} are much for a frozen specimen, and noisy views give angles that are surer than "
+        "right: look at the XZ and YZ planes, or give --level PITCH,X_TILT",
+        angles));
+}
+
 }  // namespace
 
-Levelling found_levelling(const std::filesystem::path& model) {
+Levelling found_levelling(const ModelInfo& model, const std::filesystem::path& file) {
   constexpr const char* kAdvice = "give both angles in degrees: --level PITCH,X_TILT";
-  const std::filesystem::path path = output_paths(model).alignment;
+  const std::filesystem::path path = output_paths(file).alignment;
   if (!io::is_file(path)) {
     throw Error(
         fmt::format("there is no '{}' beside '{}', which --align writes, to level it by: {}",
-                    path.string(), model.string(), kAdvice));
+                    path.string(), file.string(), kAdvice));
   }
   try {
     const alignment::AlignmentRecord record = alignment::read_record(path);
+    require_own(model, record);
     if (!record.pose) throw Error("the views could not tell the pitch");
     const auto& [pose, error] = *record.pose;
     const Levelling found{.pitch_deg = sure_angle(pose.pitch_deg, error.pitch_deg),
                           .x_tilt_deg = sure_angle(pose.x_tilt_deg, error.x_tilt_deg)};
     if (found.pitch_deg == 0.0 && found.x_tilt_deg == 0.0)
       throw Error("neither the pitch nor the tilt about X is three of its standard errors");
+    tell_levelling(found);
     return found;
   } catch (const std::exception& error) {
     throw Error(fmt::format("'{}' does not tell how to level the specimen: {}; {}", path.string(),

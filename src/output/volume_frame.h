@@ -4,20 +4,16 @@
 
 #include "field/sampling/sample_box.h"
 #include "output/model_file.h"
+#include "tomofield/model.h"
 
 namespace tomofield::output {
 
-/// The angles that bring a specimen level, as options of a reconstruction would
-/// (`--tilt-offset`, `--x-axis-tilt`).
-struct Levelling {
-  double pitch_deg = 0.0;   ///< is added to all tilt angles
-  double x_tilt_deg = 0.0;  ///< is subtracted from the x-axis tilts of all views
-};
-
 /// Returns how far the specimen of a model was found to be from level by the alignment of its
 /// run, which lies beside the model (NAME_align.json of NAME.h5). An angle below three of its
-/// standard errors is 0. Throws Error if there is no such file, or if it could not tell an angle.
-Levelling found_levelling(const std::filesystem::path& model);
+/// standard errors is 0. The log says which angles they are. Throws Error if there is no such file,
+/// if it is of another series than the model, or if it could not tell an angle. `file` is that of
+/// `model`.
+Levelling found_levelling(const ModelInfo& model, const std::filesystem::path& file);
 
 /// The place of a volume in the field of a model. A point P of the volume lies in the field at
 ///

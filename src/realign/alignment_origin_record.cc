@@ -95,23 +95,6 @@ json relevant_options(const options::ReconstructOptions& options) {
             {"activation", all["field"]["activation"]}}}};
 }
 
-std::string size_text(const alignment::AlignmentOrigin& series) {
-  return fmt::format("{} sections of {} × {} pixels", series.num_sections, series.size_px[0],
-                     series.size_px[1]);
-}
-
-void require_origin(const alignment::AlignmentOrigin& found,
-                    const alignment::AlignmentOrigin& wanted) {
-  if (size_text(found) != size_text(wanted))
-    throw Error(fmt::format("it is of a series of {}, and this one has {}", size_text(found),
-                            size_text(wanted)));
-  alignment::AlignmentOrigin series = found;
-  series.made_with = wanted.made_with;
-  if (series != wanted)
-    throw Error("it was made from another series: its images or its files are not the same");
-  if (found.made_with != wanted.made_with) throw Error("it was made with other options");
-}
-
 }  // namespace
 
 alignment::AlignmentOrigin alignment_origin(const options::ReconstructOptions& options) {
@@ -130,7 +113,8 @@ alignment::AlignmentRecord read_alignment_record(const std::filesystem::path& pa
                                                  const alignment::AlignmentOrigin& origin) {
   try {
     alignment::AlignmentRecord record = alignment::read_record(path);
-    require_origin(record.origin, origin);
+    if (const std::string why = alignment::difference_of(record.origin, origin); !why.empty())
+      throw Error(why);
     return record;
   } catch (const std::exception& error) {
     throw Error(

@@ -5,6 +5,7 @@ import json
 import os
 import sys
 
+import h5py
 import mrcfile
 import numpy as np
 import pytest
@@ -289,6 +290,32 @@ def test_a_record_of_another_series_or_run_is_refused(shifted):
     with mrcfile.open(stack, mode="r+") as file:
         file.data[0] = first
     harness.succeed(*command)
+    check_levelling(volume, path)
+
+
+def check_levelling(volume, path):
+    """A model is levelled by the record of its own alignment alone."""
+    with open(path, encoding="utf-8") as file:
+        own = json.load(file)
+    model = volume.replace(".mrc", ".h5")
+    with h5py.File(model) as file:
+        stated = json.loads(file.attrs["alignment_json"])
+    assert stated == {name: own[name] for name in ("series", "made_with")}
+
+    def level(record_of_run):
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(record_of_run, file)
+        return harness.tomofield("export", model, "-o", volume.replace(".mrc", "_level.mrc"),
+                                 "--level", "found", "--overwrite")
+
+    assert "another" not in level(own).stderr
+    for section, changes, word in (("series", {"pixels": "0"}, "another series"),
+                                   ("series", {"sections": 99}, "99 sections"),
+                                   ("made_with", {"seed": 7}, "other options")):
+        refused = level({**own, section: {**own[section], **changes}})
+        assert refused.returncode == 2, refused
+        for part in (path, word, "--level PITCH,X_TILT"):
+            assert part in refused.stderr, refused.stderr
 
 
 def test_a_dry_run_counts_the_alignment(shifted):

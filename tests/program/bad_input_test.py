@@ -421,9 +421,34 @@ def test_unknown_options_are_named_with_those_that_are_like_them():
     for arguments, says in ((["--thicknes", "160"], "no option --thicknes (did you mean --thickness?);"),
                             (["--algn", "refine"], "no option --algn (did you mean --aln or --align?);"),
                             (["--zzzzzz=3", "-q", "-3"], "no option --zzzzzz; there is no option -q;"),
+                            (["--axis", 85], "no option --axis (did you mean --axes?);"),
+                            (["--thick", 85], "no option --thick (did you mean --thickness?);"),
+                            (["--tv-weight", 3], "no option --tv-weight (did you mean --tv?);"),
                             (["a", "b", "--thickness", 3, "-o", "c.mrc"], "'a', 'b' belong to no option")):
         result = harness.tomofield("reconstruct", "series.mrc", *arguments)
         assert result.returncode == 2 and says in result.stderr, result.stderr
+
+
+def test_a_stack_that_is_not_there_comes_before_what_it_would_need(inputs):
+    for command in (["reconstruct"], ["align"], ["baseline", "wbp"]):
+        for arguments in ([], ["--thickness", "0x"], ["-o", "x.mrc"]):
+            result = harness.tomofield(*command, "nope.mrc", *arguments, cwd=inputs)
+            assert result.returncode == 2 and "'nope.mrc' does not exist" in result.stderr, result
+    result = harness.tomofield("reconstruct", "nope.mrc", "--thicknes", 3, cwd=inputs)
+    assert "no option --thicknes" in result.stderr, result
+
+
+def test_options_are_named_as_they_are_written(stack):
+    for arguments, says in (
+            (["reconstruct", stack, "--bin", 2, "--bin", 4], "--bin is given twice: give it once;"),
+            (["reconstruct", stack, "--bin=2", "--bin=2", "--bin=2"], "--bin is given 3 times: give"),
+            (["export", stack, "--angpix", 5, "--voxel-size", 6],
+             "--angpix and --voxel-size are one option: give one of them;"),
+            (["export", stack, "-o", "x.mrc", "--angpix", 0], "--angpix: must be a number from"),
+            (["export", stack, "-o", "x.mrc", "--voxel-size", 0], "--voxel-size: must be a number"),
+            (["export", stack, "--angpix", 5, "--bin", 2], "--angpix")):
+        result = harness.tomofield(*arguments)
+        assert result.returncode == 2 and says in result.stderr, (arguments, result.stderr)
 
 
 def test_volumes_have_no_name_of_another_format(tmp_path):

@@ -121,6 +121,30 @@ def test_names_are_filled_in_for_each_series(data):
             assert os.path.join(data, f"of_{name}.none") in refused.stderr, (flag, refused.stderr)
 
 
+def test_names_are_filled_in_in_cells(data):
+    folder = harness.fresh_directory("cells")
+    table = write_table(os.path.join(folder, "list.csv"),
+                        [["stack", "tlt", "output"],
+                         *([os.path.join(data, f"{name}.mrc"), "{folder}/{name}.tlt",
+                            os.path.join(folder, "{name}_x.mrc")] for name in "ab")])
+    printed = harness.succeed("batch", table, *QUICK, "--dry-run", "-o", folder).stdout
+    assert "2 of 2 series to reconstruct" in printed, printed
+    # A name that stands for nothing is named, with its cell or its option.
+    for rows, words, parts in (
+            ([["stack", "tlt"], [os.path.join(data, "a.mrc"), "{folder}/{nam}.tlt"],
+              [os.path.join(data, "b.mrc"), "{place}/b.tlt"]], [],
+             ["line 2 of", "--tlt: '{nam}'", "line 3 of", "'{place}'", "{folder} for its folder"]),
+            ([["stack", "output"], [os.path.join(data, "a.mrc"), "{nam}.mrc"]], [],
+             ["line 2 of", "output: '{nam}'"]),
+            ([["stack"], [os.path.join(data, "a.mrc")]], ["--tlt", "{nam}.tlt"],
+             ["--tlt: '{nam}' stands for nothing"])):
+        write_table(table, rows)
+        refused = harness.tomofield("batch", table, *words, *QUICK, "--dry-run", "-o", folder)
+        assert refused.returncode == 2, refused
+        for part in parts:
+            assert part in refused.stderr, (part, refused.stderr)
+
+
 def test_a_batch_makes_halves(data):
     folder, halves = harness.fresh_directory("halves"), harness.fresh_directory("frames")
     random = np.random.default_rng(1)

@@ -143,6 +143,22 @@ def test_local_alignments_of_another_series_are_refused():
         assert refused.returncode == 2, (text, refused.stdout)
         for part in parts:
             assert part in refused.stderr, (part, refused.stderr)
+    with open(write_local(folder), encoding="utf-8") as file:
+        whole = file.read().splitlines(keepends=True)
+    short = len(whole) - 4  # an odd number of numbers: one of the six of a transform is missing
+    for lines, parts in ((whole[:-1], [f"line {len(whole) - 1} on", "are missing"]),
+                         ([*whole[:short], whole[short][13:], *whole[short + 1:]],
+                          [f"line {short + 1} on", "are missing"]),
+                         (whole[:1], ["line 1 on", "has 0 numbers"]),
+                         ([whole[0].replace("10.00000", "-10.0"), *whole[1:]],
+                          ["line 1", "pixels of -10 Å"]),
+                         ([whole[0].replace("10.00000", "0"), *whole[1:]],
+                          ["line 1", "pixels of 0 Å"])):
+        write(folder, "TS_01local.xf", "".join(lines))
+        refused = harness.tomofield("reconstruct", "tilt.com", "-o", "out.mrc", *FIT, cwd=folder)
+        assert refused.returncode == 2, (parts, refused)
+        for part in ("TS_01local.xf", *parts):
+            assert part in refused.stderr, (part, refused.stderr)
     write_local(folder, num_views=len(TILTS) - 1)
     refused = harness.tomofield("reconstruct", "tilt.com", "-o", "out.mrc", *FIT, cwd=folder)
     assert refused.returncode == 2
@@ -211,7 +227,8 @@ def test_patch_shifts_that_no_specimen_has_are_named():
     path = write_aln(folder, with_patches=False)
     with open(path, "a", encoding="utf-8") as file:
         file.write("# Local Alignment\n" + "".join(
-            f"0 {p} {x} {y} {60 if x > 0 else 0} 0 1.0\n" for p, (x, y) in enumerate(PATCHES)))
+            f"{view} {p} {x} {y} {60 if x > 0 and view == 0 else 0} 0 1.0\n"
+            for view in range(len(TILTS)) for p, (x, y) in enumerate(PATCHES)))
     warned = harness.succeed("reconstruct", "TS_01.st", "--aln", "TS_01.aln", "--thickness",
                              THICKNESS, "-o", "out.mrc", *FIT, cwd=folder)
     assert "'TS_01.aln' moves parts of the views by up to 60 px, 600 Å" in warned.stderr, warned.stderr
@@ -229,3 +246,18 @@ def test_rows_of_patches_that_make_no_sense_are_refused(row):
                                 THICKNESS, "-o", "out.mrc", *FIT, cwd=folder)
     assert refused.returncode == 2 and row in refused.stderr, refused.stderr
     assert "AreTomo's local alignment" in refused.stderr, refused.stderr
+
+
+def test_rows_of_patches_that_are_missing_are_named():
+    folder = fresh_directory("torn")
+    write_views(folder, aretomo_place)
+    with open(write_aln(folder), encoding="utf-8") as file:
+        lines = file.read().splitlines(keepends=True)
+    for kept, view in ((lines[:-1], len(TILTS) - 1), (lines[:-2 * len(PATCHES)], len(TILTS) - 2)):
+        write(folder, "TS_01.aln", "".join(kept))
+        refused = harness.tomofield("reconstruct", "TS_01.st", "--aln", "TS_01.aln", "--thickness",
+                                    THICKNESS, "-o", "out.mrc", *FIT, cwd=folder)
+        assert refused.returncode == 2, refused
+        for part in ("TS_01.aln", f"line {len(kept)}", f"of view {view}",
+                     f"NumPatches = {len(PATCHES)}"):
+            assert part in refused.stderr, (part, refused.stderr)

@@ -192,8 +192,9 @@ def test_lists_that_make_no_sense_are_refused(folder):
     particles = write_particles(folder)
     old = os.path.join(folder, "old.star")
     star_projects.write_star(old, "particles", ["rlnTomoName", "rlnCoordinateX"], [["TS_01", 3]])
-    far = os.path.join(folder, "far.txt")
+    far, wrong = os.path.join(folder, "far.txt"), os.path.join(folder, "wrong.txt")
     np.savetxt(far, [[900, 900, 900]])
+    np.savetxt(wrong, [[9, 9]])
     for arguments, parts in (
             (["--particles", particles], ["--box N"]),
             (["--particles", particles, "--box", "8.5"], ["--box N"]),
@@ -201,6 +202,7 @@ def test_lists_that_make_no_sense_are_refused(folder):
             (["--box", "8"], ["'8'", "--particles"]),
             (["--particles", old, "--box", "8"], ["old.star", "RELION 4", "RELION 5"]),
             (["--particles", far, "--box", "8"], ["none of the 1 particles", "900"]),
+            (["--particles", wrong, "--box", "8"], ["wrong.txt", "line 1", "text of particles"]),
             (["--particles", particles, "--box", "8", "--rotate", "1,2,3"], ["--rotate"]),
             (["--tomogram", "TS_01"], ["--particles"])):
         os.path.exists(os.path.join(folder, "cut.mrc")) and os.remove(os.path.join(folder, "cut.mrc"))
@@ -208,6 +210,7 @@ def test_lists_that_make_no_sense_are_refused(folder):
         assert refused.returncode == 2, (arguments, refused.stdout)
         for part in parts:
             assert part in refused.stderr, (arguments, refused.stderr)
+        assert "fiducial" not in refused.stderr, refused.stderr
         assert not os.path.exists(os.path.join(folder, "cut.mrc"))
 
 
@@ -255,14 +258,15 @@ def test_a_levelled_volume_has_the_specimen_where_it_is(tilted):
     np.testing.assert_allclose(spots(volume), PLACES, atol=0.4)
 
 
-def alignment_record(pose):
-    """Returns the record of an alignment of one view that found this pose."""
-    view = {"section": 1, "tilt_deg": 0, "shift_px": [0, 0], "rotation_deg": 0,
-            "log_magnification": 0, "tilt_change_deg": 0, "correlation": 0.9,
-            "shift_error_px": [0.1, 0.1], "left_out": False}
-    series = {"sections": 1, "size_px": [8, 8], "files": {}, "header_tilts": "0", "pixels": "0"}
+def alignment_record(pose, tilts=TILTS):
+    """Returns the record of an alignment of views at these angles that found this pose."""
+    views = [{"section": i + 1, "tilt_deg": tilt, "shift_px": [0, 0], "rotation_deg": 0,
+              "log_magnification": 0, "tilt_change_deg": 0, "correlation": 0.9,
+              "shift_error_px": [0.1, 0.1], "left_out": False} for i, tilt in enumerate(tilts)]
+    series = {"sections": len(views), "size_px": [WIDTH, HEIGHT], "files": {}, "header_tilts": "0",
+              "pixels": "0"}
     return {"made_with": {}, "series": series, "accepted": True, "rotation": True,
-            "magnification": True, "tilt": True, "steps_px": [0.1], "seconds": 1, "views": [view],
+            "magnification": True, "tilt": True, "steps_px": [0.1], "seconds": 1, "views": views,
             "held_out_error": {"before": 0.5, "after": 0.4},
             "gain": {"mean": 0.1, "standard_error": 0.01}, "pose": pose}
 
@@ -285,6 +289,14 @@ def test_what_the_alignment_found_levels_the_volume(tilted, scratch):
         else:
             np.testing.assert_array_equal(levelled(scratch, "--level", "found"),
                                           levelled(scratch, "--level", level))
+    pose.update(pitch_error_deg=1)
+    with open(os.path.join(scratch, "TS_01_align.json"), "w", encoding="utf-8") as file:
+        json.dump(alignment_record(pose, TILTS[::2]), file)
+    refused = harness.tomofield("export", "TS_01.h5", "-o", "other.mrc", "--level", "found",
+                                cwd=scratch)
+    assert refused.returncode == 2, refused
+    for part in ("TS_01_align.json", "another series", f"{TILTS[1]:.2f}°"):
+        assert part in refused.stderr, refused.stderr
 
 
 def test_boxes_and_particles_lie_in_the_levelled_volume(tilted):

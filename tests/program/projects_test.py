@@ -332,7 +332,8 @@ def aretomo(folder, kept, sections, dark):
                  "# AlphaOffset =     0.00", "# BetaOffset =     0.00", f"# Thickness = {THICKNESS}",
                  "# SEC     ROT         GMAG       TX          TY      SMEAN     SFIT    SCALE     "
                  "BASE     TILT", *rows, "# Local Alignment",
-                 "   0   0   -10.42     -8.00      0.00      0.00   1.0")
+                 *(f"{i:4d}   0   -10.42     -8.00      0.00      0.00   1.0"
+                   for i in range(len(rows))))
 
 
 def test_an_alignment_of_aretomo_has_its_thickness_and_dark_frames(series):

@@ -19,7 +19,10 @@ mean = float(np.mean(made.tomogram))
 row: str = project.settings[0].row
 notes: list[str] = project.warnings
 again: tomofield.Reconstruction = tomofield.denoise(made, 1.5)
-tomofield.baseline("s.mrc", "wbp", thickness=16)
+tomofield.baseline("s.mrc", "tv", thickness=16, output="b.mrc",
+                   method_options={"iterations": 80, "penalty": "concave", "non_negative": False})
+tomofield.export("m.h5", "level.mrc", level="found", voxel_size_A=20)
+tomofield.export("m.h5", "cut.mrc", level=(3, -2), particles="particles.star", box=48)
 tomofield.export(made.model, "box.mrc", box=made.model.region(2.0), voxel_type="float16")
 tomofield.write_mrc("t.mrc", made.tomogram)
 tomofield.align("s.mrc", thickness=16, output="a.mrc", progress=lambda p: p.fraction_done < 0.5)

@@ -2,6 +2,7 @@
 
 import base64
 import io
+import json
 import re
 
 import mrcfile
@@ -115,6 +116,86 @@ def test_export_writes_what_the_command_writes(series, made, tmp_path):
                          voxel_size_A=5)
 
 
+def same_files(folder, *names):
+    for name in names:
+        assert (folder / name).read_bytes() == (folder / f"cli_{name}").read_bytes(), name
+
+
+def test_export_levels_as_the_command_does(series, made, tmp_path):
+    model = series.folder / "tomogram.h5"
+    for name, words, options in (
+            ("all.mrc", ("--level", "3,-2"), {"level": (3, -2)}),
+            ("box.mrc", ("--level", "3,-2", "--center", "12,13,8", "--size", "9,8,7"),
+             {"level": (3, -2), "box": tomofield.Box((12, 13, 8), (9, 8, 7))})):
+        series.run("export", model, "-o", tmp_path / f"cli_{name}", *words)
+        tomofield.export(model, tmp_path / name, **options)
+        same_files(tmp_path, name)
+    for wrong, said in (((3, 95), "not below 90°"), ((3, np.nan), "not below 90°")):
+        with pytest.raises(tomofield.Error, match=said):
+            tomofield.export(model, tmp_path / "x.mrc", level=wrong)
+    for wrong in (3, (1, 2, 3), "lost", ("a", "b")):
+        with pytest.raises(TypeError, match="level is 'found' or two angles in degrees"):
+            tomofield.export(model, tmp_path / "x.mrc", level=wrong)
+    with pytest.raises(tomofield.Error, match="angles of its own cannot be levelled"):
+        tomofield.export(model, tmp_path / "x.mrc", level=(3, 2),
+                         box=tomofield.Box((12, 13, 8), (9, 8, 7), euler_deg=(1, 0, 0)))
+    with pytest.raises(tomofield.Error, match="tomogram_align.json' beside"):
+        tomofield.export(model, tmp_path / "x.mrc", level="found")
+    with pytest.raises(tomofield.Error, match="model in memory has no alignment"):
+        tomofield.export(made.model, tmp_path / "x.mrc", level="found")
+    assert not (tmp_path / "x.mrc").exists()
+
+
+def test_export_takes_the_level_that_was_found(series, tmp_path):
+    model = tmp_path / "tomogram.h5"
+    model.write_bytes((series.folder / "tomogram.h5").read_bytes())
+    views = [{"section": i + 1, "tilt_deg": tilt, "shift_px": [0, 0], "rotation_deg": 0,
+              "log_magnification": 0, "tilt_change_deg": 0, "correlation": 0.9,
+              "shift_error_px": [0.1, 0.1], "left_out": False}
+             for i, tilt in enumerate(series.tilt_deg)]
+    pose = {"pitch_deg": 5, "pitch_error_deg": 1, "x_tilt_deg": -4, "x_tilt_error_deg": 1,
+            "thickness_px": 16, "thickness_error_px": 2}
+    (tmp_path / "tomogram_align.json").write_text(json.dumps(
+        {"made_with": {}, "accepted": True, "rotation": True, "magnification": True, "tilt": True,
+         "steps_px": [0.1], "seconds": 1, "views": views, "pose": pose,
+         "series": {"sections": len(views), "size_px": [32, 32], "files": {}, "header_tilts": "0",
+                    "pixels": "0"},
+         "held_out_error": {"before": 0.5, "after": 0.4},
+         "gain": {"mean": 0.1, "standard_error": 0.01}}))
+    tomofield.export(tomofield.Model(model), tmp_path / "found.mrc", level="found")
+    tomofield.export(model, tmp_path / "given.mrc", level=(5, -4))
+    assert (tmp_path / "found.mrc").read_bytes() == (tmp_path / "given.mrc").read_bytes()
+
+
+def test_export_cuts_particles_as_the_command_does(series, made, tmp_path):
+    model, points = series.folder / "tomogram.h5", tmp_path / "points.txt"
+    points.write_text("12 13 8\n20 14 7\n")
+    series.run("export", model, "-o", tmp_path / "cli_cut.mrc", "--particles", points, "--box", 6,
+               "--voxel-size", 12, "--level", "3,-2", "--mode", 12)
+    tomofield.export(model, tmp_path / "cut.mrc", particles=points, box=6, voxel_size_A=12,
+                     level=(3, -2), voxel_type="float16")
+    same_files(tmp_path, "cut.mrc")
+    written = (tmp_path / "cli_cut.star").read_text()
+    assert (tmp_path / "cut.star").read_text() == written.replace("cli_cut.mrc", "cut.mrc")
+    tomofield.export(made.model, tmp_path / "memory.mrc", particles=points, box=6, tomogram="TS_01")
+    assert "TS_01" in (tmp_path / "memory.star").read_text()
+    with pytest.raises(tomofield.Error, match="name: give that of its tomogram"):
+        tomofield.export(made.model, tmp_path / "x.mrc", particles=points, box=6)
+    with pytest.raises(tomofield.Error, match="from 1 to 4096"):
+        tomofield.export(model, tmp_path / "x.mrc", particles=points, box=0)
+    with pytest.raises(tomofield.Error, match="leave --zarr and --axes out"):
+        tomofield.export(model, tmp_path / "x.mrc", particles=points, box=6, zarr=True)
+    with pytest.raises(tomofield.Error, match="cut.mrc' exists"):
+        tomofield.export(model, tmp_path / "cut.mrc", particles=points, box=6)
+    with pytest.raises(TypeError, match="cubes of particles in voxels, is a whole number"):
+        tomofield.export(model, tmp_path / "x.mrc", particles=points)
+    with pytest.raises(TypeError, match="a side alone is for particles"):
+        tomofield.export(model, tmp_path / "x.mrc", box=6)
+    with pytest.raises(tomofield.Error, match="give their list with particles"):
+        tomofield.export(model, tmp_path / "x.mrc", tomogram="TS_01")
+    assert not (tmp_path / "x.mrc").exists()
+
+
 @pytest.mark.parametrize("method", ("wbp", "sirt", "sart-tv", "tv"))
 def test_baselines_are_those_of_the_command(series, options, method, tmp_path):
     series.run("baseline", method, "s.mrc", "--tlt", "s.tlt", "--thickness", 16, "--contrast",
@@ -132,19 +213,62 @@ def test_baselines_are_those_of_the_command(series, options, method, tmp_path):
     np.testing.assert_array_equal(again.tomogram.values, made.tomogram.values)
 
 
-def test_baselines_can_be_stopped_and_refuse_what_they_cannot_do(series, options):
+@pytest.mark.parametrize("method, words, own", (
+    ("wbp", ("--window", "cosine", "--cutoff", 0.3), {"window": "cosine", "cutoff": 0.3}),
+    ("tv", ("--iterations", 7, "--penalty", "concave", "--weight", 5, "--non-negative", "off"),
+     {"iterations": 7, "penalty": "concave", "weight": 5, "non_negative": False}),
+    ("sart-tv", ("--iterations", 2, "--tv-steps", 3), {"iterations": 2, "tv_steps": 3}),
+    ("ingp", ("--iterations", 2, "--levels", 2, "--width", 8),
+     {"iterations": 2, "levels": 2, "width": 8}),
+    ("fourier-net", ("--iterations", 2, "--features", 8, "--seed", 5),
+     {"iterations": 2, "features": 8, "seed": 5})))
+def test_baselines_take_their_options_and_write_files(series, options, method, words, own, tmp_path):
+    (tmp_path / "cli").mkdir()
+    series.run("baseline", method, "s.mrc", "--tlt", "s.tlt", "--thickness", 16, "--contrast",
+               "bright", "--no-margin", *words, "-o", tmp_path / "cli" / "b.mrc")
+    made = tomofield.baseline(series.folder / "s.mrc", method, method_options=own,
+                              output=tmp_path / "b.mrc", **options)
+    assert made.tomogram is None and made.is_finished
+    by_command = {file.name for file in (tmp_path / "cli").iterdir()}
+    assert by_command == {file.name for file in tmp_path.iterdir()} - {"cli"}
+    assert "b.json" in by_command and "b_xy.png" in by_command
+    for file in by_command - {"b.json"}:
+        assert (tmp_path / file).read_bytes() == (tmp_path / "cli" / file).read_bytes(), file
+    written = tomofield.read_record(tmp_path / "cli" / "b.mrc")
+    assert made.options["method"] == written.options["method"]
+    assert tomofield.read_record(tmp_path / "b.mrc").options["method"] == made.options["method"]
+    with pytest.raises(tomofield.Error, match="b.mrc' exists"):
+        tomofield.baseline(series.folder / "s.mrc", method, method_options=own,
+                           output=tmp_path / "b.mrc", **options)
+
+
+@pytest.mark.parametrize("own, said", (
+    ({"iteration": 3}, r"sirt has no option 'iteration' \(did you mean iterations\?\)"),
+    ({"window": "hann"}, "sirt has no option 'window'.*relaxation"),
+    ({"iterations": 0}, "--iterations must be a whole number above 0, not '0'"),
+    ({"iterations": 2.5}, "--iterations must be a whole number above 0, not '2.5'"),
+    ({"relaxation": "much"}, "--relaxation must be a number from 0.01 to 1.99, not 'much'"),
+    ({"non_negative": 3}, "--non-negative must be auto, on or off, not '3'"),
+    ({"ctf_correction": "none"}, "--ctf-correction must be flip or")))
+def test_options_that_a_method_has_not_are_named(series, options, own, said):
+    with pytest.raises(tomofield.Error, match=said):
+        tomofield.baseline(series.folder / "s.mrc", "sirt", method_options=own, **options)
+
+
+def test_baselines_can_be_stopped_and_refuse_what_they_cannot_do(series, options, tmp_path):
     stack = series.folder / "s.mrc"
     stopped = tomofield.baseline(stack, "sirt", progress=lambda p: p.fraction_done < 0.2, **options)
     assert not stopped.is_finished and stopped.tomogram is None
+    stopped = tomofield.baseline(stack, "sirt", progress=lambda p: p.fraction_done < 0.2,
+                                 output=tmp_path / "b.mrc", **options)
+    assert not stopped.is_finished and list(tmp_path.glob("b*")) == []
 
     def fail(progress):
         raise ZeroDivisionError("of the callback")
     with pytest.raises(ZeroDivisionError, match="of the callback"):
         tomofield.baseline(stack, "sirt", progress=fail, **options)
-    with pytest.raises(tomofield.Error, match="'wbp', 'sirt', 'sart-tv', 'tv', not 'fbp'"):
+    with pytest.raises(tomofield.Error, match="'wbp', 'sirt', 'sart-tv', 'tv', .*, not 'fbp'"):
         tomofield.baseline(stack, "fbp", **options)
-    with pytest.raises(tomofield.Error, match="stays in memory"):
-        tomofield.baseline(stack, output="b.mrc", **options)
 
 
 def test_denoise_fits_again_without_trials(series, made):

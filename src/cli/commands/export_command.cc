@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "base/check.h"
-#include "base/log.h"
 #include "cli/commands/commands.h"
 #include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
@@ -21,16 +20,16 @@
 #include "cli/terminal/console.h"
 #include "compact/budget.h"
 #include "compact/compress.h"
-#include "exchange/particles/particle_list.h"
+#include "exchange/model_export.h"
 #include "exchange/particles/particle_stack.h"
 #include "io/saving/output_files.h"
 #include "io/saving/output_lock.h"
 #include "io/saving/output_set.h"
-#include "output/box_bounds.h"
 #include "output/model_file.h"
 #include "output/volume.h"
 #include "output/volume_frame.h"
 #include "tomofield/error.h"
+#include "tomofield/model.h"
 
 namespace tomofield::cli {
 namespace {
@@ -57,22 +56,21 @@ struct ExportArguments {
 
 constexpr const char* kFound = "found";
 
+exchange::ExportFiles files_of(const ExportArguments& arguments) {
+  return {.output = arguments.output,
+          .model = arguments.model,
+          .particles = arguments.particles,
+          .volume = arguments.choices.options.volume,
+          .overwrite = arguments.overwrite};
+}
+
 // Checks that the files can be written, and locks the first one.
 std::vector<io::OutputLock> claim_output(const ExportArguments& arguments) {
-  const std::filesystem::path& written =
-      arguments.compact.empty() ? arguments.output : arguments.compact;
-  return io::claim_outputs({written}, [&] {
-    constexpr const char* kAdvice = "give another name, or --overwrite to replace it";
+  constexpr const char* kAdvice = "give another name, or --overwrite to replace it";
+  if (arguments.compact.empty()) return exchange::claim_export(files_of(arguments), kAdvice);
+  return io::claim_outputs({arguments.compact}, [&] {
     base::require_no_faults(output::faults_of(arguments.choices.options.volume));
-    std::vector<std::filesystem::path> results{written}, inputs{arguments.model};
-    if (!arguments.particles.empty()) {
-      results.push_back(exchange::particle_star(written));
-      inputs.push_back(arguments.particles);
-    }
-    io::check_output_files(results, inputs, arguments.overwrite, kAdvice);
-    if (arguments.compact.empty()) io::require_volume_name(arguments.output);
-    if (arguments.compact.empty() && arguments.choices.options.volume.zarr)
-      output::check_zarr(arguments.output, arguments.overwrite, kAdvice);
+    io::check_output_files({arguments.compact}, {arguments.model}, arguments.overwrite, kAdvice);
   });
 }
 
@@ -91,31 +89,12 @@ std::vector<double> parse_numbers(const std::string& text, std::size_t count,
   throw Error(fmt::format("'{}' is not {}", text, what));
 }
 
-// Returns the angles that the alignment found, and says which they are.
-output::Levelling found_levelling(const ExportArguments& arguments) {
-  constexpr double kUsual_deg = 12.0;  // sections of frozen cells lie flatter
-  const output::Levelling found = output::found_levelling(arguments.model);
-  const std::string angles = fmt::format("a pitch of {:.1f}° and a tilt about X of {:.1f}°",
-                                         found.pitch_deg, found.x_tilt_deg);
-  base::log_info(fmt::format("levelled by {}; 0 is what the views are not sure of", angles));
-  if (std::abs(found.pitch_deg) > kUsual_deg || std::abs(found.x_tilt_deg) > kUsual_deg / 2)
-    base::log_warning(fmt::format(
-        "{} are much for a frozen specimen, and noisy views give angles that are surer than "
-        "right: look at the XZ and YZ planes, or give --level PITCH,X_TILT",
-        angles));
-  return found;
-}
-
-output::Levelling levelling_of(const ExportArguments& arguments) {
-  constexpr double kLargest_deg = 90.0;
-  if (arguments.level.empty()) return {};
-  if (arguments.level == kFound) return found_levelling(arguments);
+std::optional<Levelling> levelling_of(const ExportArguments& arguments, const Model& model) {
+  if (arguments.level.empty()) return std::nullopt;
+  if (arguments.level == kFound) return output::found_levelling(model, arguments.model);
   const auto angles =
       parse_numbers(arguments.level, 2, "PITCH,X_TILT in degrees, or 'found' (--level)");
-  for (const double angle : angles)
-    if (std::abs(angle) >= kLargest_deg)
-      throw Error(fmt::format("--level {} has an angle that is not below 90°", arguments.level));
-  return {.pitch_deg = angles[0], .x_tilt_deg = angles[1]};
+  return Levelling{.pitch_deg = angles[0], .x_tilt_deg = angles[1]};
 }
 
 double voxel_px_of(const ExportArguments& arguments, const Model& model) {
@@ -139,40 +118,26 @@ OrientedBox box_between_corners(const std::string& corners, double voxel_px) {
   return field::box_between(low, high, voxel_px);
 }
 
-// Warns of a box beyond the region of interest.
-void warn_of_margin(const Model& model, const OrientedBox& box) {
-  const output::BoxBounds bounds(box), region = output::region_bounds(model);
-  const auto axis = bounds.axis_beyond(region, 0.5 * box.voxel_px);
-  if (!axis) return;
-  base::log_warning(fmt::format(
-      "the box reaches outside the region that was reconstructed: its {} runs from {:.6g} to "
-      "{:.6g} px, the region's from {:.6g} to {:.6g}; what lies there is a guess or nothing",
-      "xyz"[*axis], bounds.low[*axis], bounds.high[*axis], region.low[*axis], region.high[*axis]));
-}
-
 // Returns the box that the user describes, in the field.
 OrientedBox exported_box(const ExportArguments& arguments, const Model& model) {
-  const double voxel_px = voxel_px_of(arguments, model);
-  const output::Levelling levelling = levelling_of(arguments);
   const auto& angles = arguments.rotation;
   const field::Rotation rotation =
       angles.empty() ? field::kNoRotation
                      : field::rotation_from_euler(angles[0], angles[1], angles[2]);
+  exchange::ExportPlace place{.voxel_px = voxel_px_of(arguments, model),
+                              .level = levelling_of(arguments, model)};
   if (arguments.size.empty() && arguments.box.empty()) {
-    OrientedBox box = output::region_box(model, voxel_px, levelling);
+    OrientedBox box = exchange::box_in_field(model, place);
     if (!angles.empty()) box.field_from_box = rotation;
     return box;
   }
-  OrientedBox box =
-      arguments.size.empty()
-          ? box_between_corners(arguments.box, voxel_px)
-          : OrientedBox{.centre_px = point(arguments.centre.data()),
-                        .size = {arguments.size[0], arguments.size[1], arguments.size[2]},
-                        .voxel_px = voxel_px};
-  box.field_from_box = rotation;
-  if (!arguments.level.empty()) box = output::VolumeFrame(model, levelling).to_field(box);
-  warn_of_margin(model, box);
-  return box;
+  place.box = arguments.size.empty()
+                  ? box_between_corners(arguments.box, place.voxel_px)
+                  : OrientedBox{.centre_px = point(arguments.centre.data()),
+                                .size = {arguments.size[0], arguments.size[1], arguments.size[2]},
+                                .voxel_px = place.voxel_px};
+  place.box->field_from_box = rotation;
+  return exchange::box_in_field(model, place);
 }
 
 // Writes the model again with factors in place of its vertices.
@@ -205,40 +170,37 @@ void write_compact(const ExportArguments& arguments) {
 
 void export_volume(const ExportArguments& arguments, const Model& model) {
   const OrientedBox box = exported_box(arguments, model);
-  io::OutputSet results;
-  output::write_volume(model, arguments.choices.options.volume, arguments.output, {.box = box});
-  results.commit();
+  exchange::export_volume(model, box, files_of(arguments));
   print("{}: {} × {} × {} voxels (x, y, z) of {:.6g} Å about {:.6g}, {:.6g}, {:.6g} px\n",
         arguments.output.string(), box.size[0], box.size[1], box.size[2],
         box.voxel_px * model.pixel_size_A, box.centre_px[0], box.centre_px[1], box.centre_px[2]);
 }
 
-void export_particles(const ExportArguments& arguments, const Model& model) {
-  constexpr double kLargestSide = 4096;
+// Returns the side of the boxes of particles in voxels, or 0 if it is no whole number.
+std::int64_t side_of(const ExportArguments& arguments) {
+  if (arguments.box.empty()) return 0;
   const double side =
-      arguments.box.empty()
-          ? 0.0
-          : parse_numbers(arguments.box, 1, "the side of the boxes in voxels (--box N)").front();
-  if (!(side >= 1 && side <= kLargestSide && side == std::floor(side)))
-    throw Error("--particles needs the side of their boxes in voxels: --box N, from 1 to 4096");
-  const exchange::ParticleBoxes boxes{.size = static_cast<std::int64_t>(side),
-                                      .voxel_px = voxel_px_of(arguments, model),
-                                      .levelling = levelling_of(arguments)};
-  exchange::ParticleList list =
-      exchange::read_particle_list(arguments.particles, arguments.model, model, arguments.tomogram);
-  const std::size_t count = list.particles.size();
-  io::OutputSet results;
-  const std::size_t num_cut = exchange::write_particles(
-      model, std::move(list), boxes, arguments.choices.options.volume, arguments.output);
-  results.commit();
+      parse_numbers(arguments.box, 1, "the side of the boxes in voxels (--box N)").front();
+  const bool is_side =
+      side == std::floor(side) && side >= 1 && side <= std::numeric_limits<std::int32_t>::max();
+  return is_side ? static_cast<std::int64_t>(side) : 0;
+}
+
+void export_particles(const ExportArguments& arguments, const Model& model) {
+  const exchange::ParticleBoxes boxes{
+      .size = side_of(arguments),
+      .voxel_px = voxel_px_of(arguments, model),
+      .levelling = levelling_of(arguments, model).value_or(Levelling{})};
+  const auto [count, num_beyond] =
+      exchange::export_particles(model, boxes, arguments.tomogram, files_of(arguments));
   print("{}: {} particle{} in boxes of {}³ voxels of {:.6g} Å; the list is {}\n",
         arguments.output.string(), count, count == 1 ? "" : "s", boxes.size,
         boxes.voxel_px * model.pixel_size_A, exchange::particle_star(arguments.output).string());
-  if (num_cut == 0) return;
+  if (num_beyond == 0) return;
   print(
       "{} of the {} boxes reach outside the region that was reconstructed: what lies there is a "
       "guess, or 0\n",
-      num_cut, count);
+      num_beyond, count);
 }
 
 void run_export(ExportArguments& arguments) {

@@ -4,8 +4,8 @@
 #include <string>
 #include <utility>
 
+#include "baseline/method_options.h"
 #include "cli/options/help_formatter.h"
-#include "cli/options/number_checks.h"
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
 #include "record/plan_record.h"
@@ -35,19 +35,11 @@ void add_non_negative(CLI::App& command, std::optional<bool>& value) {
           [&value](const std::string& text) {
             value = text == "auto" ? std::nullopt : std::optional(text == "on");
           },
-          "Keep densities at or above zero: with dark contrast nothing is brighter than the empty "
-          "beam")
+          std::string(baseline::kNonNegativeHelp))
       ->check(CLI::IsMember({"auto", "on", "off"}))
       ->type_name("auto|on|off")
-      ->default_str("off for dark contrast, whose zero is uncertain, else on")
+      ->default_str(std::string(baseline::kNonNegativeDefault))
       ->group("Method");
-}
-
-void add_seed(CLI::App& command, std::uint64_t& seed, const char* group) {
-  command.add_option("--seed", seed, "Seed of all random numbers")
-      ->check(seed_check())
-      ->capture_default_str()
-      ->group(group);
 }
 
 void print_sizes(const Sizes& sizes) {

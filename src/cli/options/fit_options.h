@@ -15,11 +15,8 @@ namespace tomofield::cli {
 /// Registers --view-scale, --margin-spacing and --hold-out, which every method has.
 void add_shared_fit_options(CLI::App& command, option_table::Choices& choices);
 
-/// Registers --non-negative of a baseline: auto (no value), on or off.
+/// Registers --non-negative of the baseline `tensorf`: auto (no value), on or off.
 void add_non_negative(CLI::App& command, std::optional<bool>& value);
-
-/// Registers the --seed of a baseline.
-void add_seed(CLI::App& command, std::uint64_t& seed, const char* group);
 
 /// The sizes of the views and of the tomogram.
 struct Sizes {

@@ -37,6 +37,17 @@ double unbinned_pixel_A(const output::ModelInfo& model) {
   return model.pixel_size_A / output::input_of(model).bin;
 }
 
+/// Returns the name of the tomogram whose particles are wanted: the given one, or that of the
+/// model's file. It is empty if there is neither.
+std::string wanted_name(const fs::path& model_file, const std::string& tomogram) {
+  return tomogram.empty() ? model_file.stem().string() : tomogram;
+}
+
+void require_name(const std::string& wanted) {
+  if (wanted.empty())
+    throw Error("a model in memory has no name: give that of its tomogram (--tomogram)");
+}
+
 // ------------------------------------------------------------------ RELION
 
 /// Says whose particles are taken, where the list does not only name the tomogram that is wanted.
@@ -46,7 +57,7 @@ void tell_choice(const fs::path& path, std::size_t num_rows, std::size_t num_tak
     base::log_info(
         fmt::format("{} of the {} particles of '{}' are of '{}'; the others are left out",
                     num_taken, num_rows, path.string(), wanted));
-  } else if (!only.empty() && only != wanted) {
+  } else if (!only.empty() && !wanted.empty() && only != wanted) {
     base::log_warning(
         fmt::format("all particles of '{}' are of '{}', and the model is called '{}': they are "
                     "taken for its own",
@@ -62,7 +73,8 @@ std::vector<std::size_t> rows_of_tomogram(const fs::path& path, const io::StarTa
   for (std::size_t row = 0; row < table.num_rows(); ++row)
     names.insert(table.find(row, kTomogramName).value_or(""));
   const bool is_only = names.size() == 1 && tomogram.empty();
-  const std::string wanted = tomogram.empty() ? model_file.stem().string() : tomogram;
+  const std::string wanted = wanted_name(model_file, tomogram);
+  if (!is_only) require_name(wanted);
   for (std::size_t row = 0; row < table.num_rows(); ++row)
     if (is_only || table.find(row, kTomogramName).value_or("") == wanted) rows.push_back(row);
   if (!rows.empty()) {
@@ -144,7 +156,8 @@ ParticleList read_relion(const fs::path& path, const fs::path& model_file,
 
 ParticleList read_points(const fs::path& path, const fs::path& model_file,
                          const output::ModelInfo& model, const std::string& tomogram) {
-  const std::string name = tomogram.empty() ? model_file.stem().string() : tomogram;
+  const std::string name = wanted_name(model_file, tomogram);
+  require_name(name);
   const double unbinned_A = unbinned_pixel_A(model);
   const Point centre = output::VolumeFrame(model).centre();
   std::vector<std::string> columns{kTomogramName};
@@ -155,7 +168,7 @@ ParticleList read_points(const fs::path& path, const fs::path& model_file,
   list.optics = {"optics", {kOpticsGroup, "rlnOpticsGroupName", kSeriesPixel}};
   list.optics.add_row({"1", name, fmt::format("{:.6f}", unbinned_A)});
   list.table = {"particles", columns};
-  for (const io::FiducialPoint& point : io::read_fiducial_points(path)) {
+  for (const io::FiducialPoint& point : io::read_fiducial_points(path, "particles")) {
     const Point place{static_cast<double>(model.roi.x0) + point.x_px,
                       static_cast<double>(model.roi.y0) + point.y_px, point.section + 0.5};
     std::vector<std::string> row{name};

@@ -33,7 +33,8 @@ struct ParticleList {
 ///   of the unbinned tomogram (ParticleSet::getParticleCoordDecenteredPixel), so half a pixel above
 ///   the middle of our volume. Its subvolume is turned by rlnTomoSubtomogramRot, Tilt and Psi.
 ///   Offsets (rlnOriginXAngst) stay offsets from the centre of the subvolume. Of several
-///   tomograms (rlnTomoName), that of this name is taken: `tomogram`, or that of the model's file.
+///   tomograms (rlnTomoName), that of this name is taken: `tomogram`, or that of the model's file,
+///   which is empty for a model in memory.
 /// - Any other file is the text that IMOD's model2point writes: x, y, z in voxels of the volume
 /// that
 ///   reconstruct wrote, in the order of --axes xyz; the middle of the first voxel is (0.5, 0.5, 0).

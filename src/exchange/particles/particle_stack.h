@@ -7,15 +7,16 @@
 #include "exchange/particles/particle_list.h"
 #include "output/model_file.h"
 #include "output/volume_frame.h"
+#include "tomofield/model.h"
 #include "tomofield/options.h"
 
 namespace tomofield::exchange {
 
 /// The boxes in which particles are cut out.
 struct ParticleBoxes {
-  std::int64_t size = 0;          ///< voxels along each side
-  double voxel_px = 1.0;          ///< side of a voxel in pixels of the model
-  output::Levelling levelling{};  ///< of the volume to which places and orientations refer
+  std::int64_t size = 0;  ///< voxels along each side
+  double voxel_px = 1.0;  ///< side of a voxel in pixels of the model
+  Levelling levelling{};  ///< of the volume to which places and orientations refer
 };
 
 /// Returns the STAR file of a stack of particles: NAME.star beside NAME.mrc.

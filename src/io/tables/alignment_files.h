@@ -133,14 +133,15 @@ struct AreTomoAlignment {
   double alpha_offset_deg = 0.0;                        ///< already included in the rows' angles
   double beta_offset_deg = 0.0;
   std::optional<double> thickness;  ///< of the specimen, in pixels; none if it was not measured
+  std::int64_t num_patches = 0;     ///< of each row of the local alignment; 0: not stated
   std::vector<AreTomoRow> rows;
   /// [row]: the patches whose shifts AreTomo calls good; empty without a local alignment.
   std::vector<std::vector<AreTomoPatch>> patches;
 };
 
-/// Reads an .aln file. Throws Error with the
-/// column for a number that cannot be; without `needs_tilt` such a tilt is 0, because another file
-/// has the tilts.
+/// Reads an .aln file. Throws Error with the line for rows of the local alignment that are missing
+/// or malformed, and with the column for a number that cannot be; without `needs_tilt` such a tilt
+/// is 0, because another file has the tilts.
 AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path, bool needs_tilt = true);
 
 /// Returns the zero-based section of the stack for each row. AreTomo's versions count SEC from 0 or

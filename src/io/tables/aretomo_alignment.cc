@@ -44,6 +44,9 @@ void parse_header_line(const std::filesystem::path& path, const TextLine& line,
   if (name == "RawSize") {
     require(3);
     alignment->raw_size = {integer(0), integer(1), integer(2)};
+  } else if (name == "NumPatches") {
+    require(1);
+    alignment->num_patches = integer(0);
   } else if (name == "DarkFrame") {
     require(2);
     alignment->dark_places.push_back(integer(0));
@@ -98,10 +101,33 @@ AreTomoRow parse_row(const std::filesystem::path& path, const TextLine& line, bo
   return {*section, line.number, used[0], used[1], used[2], used[3], used[4]};
 }
 
+// The rows of the local alignment that were read: how many, of each row of the global one, and the
+// last line.
+struct PatchRows {
+  std::vector<std::int64_t> counts;
+  int last_line = 0;
+};
+
+// Throws Error unless each row of the global alignment has as many rows of the local one as the
+// file states.
+void require_all_patches(const std::filesystem::path& path, const AreTomoAlignment& alignment,
+                         const PatchRows& rows) {
+  if (rows.counts.empty() || alignment.num_patches <= 0) return;
+  for (std::size_t t = 0; t < rows.counts.size(); ++t) {
+    if (rows.counts[t] == alignment.num_patches) continue;
+    throw Error(fmt::format(
+        "'{}', which ends at line {}, has {} row{} of the local alignment of view {}, and "
+        "'# NumPatches = {}' states as many for each: take a whole copy of the file, or delete the "
+        "lines from '# Local Alignment' on to do without it",
+        path.string(), rows.last_line, rows.counts[t], rows.counts[t] == 1 ? "" : "s", t,
+        alignment.num_patches));
+  }
+}
+
 // Adds a row "t p x y dx dy good" of the local alignment, where t counts the rows of the global
 // one.
-void add_patch(const std::filesystem::path& path, const TextLine& line,
-               AreTomoAlignment& alignment) {
+void add_patch(const std::filesystem::path& path, const TextLine& line, AreTomoAlignment& alignment,
+               PatchRows& rows) {
   constexpr std::size_t kColumns = 7;
   const auto words = split_words(line.text);
   const auto row = words.size() == kColumns ? parse_integer(words[0]) : std::nullopt;
@@ -111,6 +137,9 @@ void add_patch(const std::filesystem::path& path, const TextLine& line,
         fmt::format("a row of AreTomo's local alignment of {} views: t p x y dx dy good",
                     alignment.rows.size()));
   alignment.patches.resize(alignment.rows.size());
+  rows.counts.resize(alignment.rows.size());
+  ++rows.counts[static_cast<std::size_t>(*row)];
+  rows.last_line = line.number;
   const auto good = parse_number(words[6]);
   if (!good || *good < 0.9) return;  // as AreTomo does; such a row may have nan
   std::array<double, 4> numbers{};
@@ -127,13 +156,14 @@ void add_patch(const std::filesystem::path& path, const TextLine& line,
 
 AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path, bool needs_tilt) {
   AreTomoAlignment alignment;
+  PatchRows patch_rows;
   bool is_local_part = false;
   for (const TextLine& line : read_text_lines(path)) {
     if (line.text.starts_with('#')) {
       is_local_part = is_local_part || line.text.find("Local Alignment") != std::string::npos;
       parse_header_line(path, line, &alignment);
     } else if (is_local_part) {
-      add_patch(path, line, alignment);
+      add_patch(path, line, alignment, patch_rows);
     } else {
       alignment.rows.push_back(parse_row(path, line, needs_tilt));
     }
@@ -141,6 +171,7 @@ AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path, bool 
   if (alignment.rows.empty()) {
     throw Error(fmt::format("'{}' has no rows of an AreTomo alignment", path.string()));
   }
+  require_all_patches(path, alignment, patch_rows);
   return alignment;
 }
 

@@ -12,21 +12,26 @@ namespace {
 
 constexpr std::size_t kMinColumns = 3, kMaxColumns = 5;
 
-[[noreturn]] void refuse(const std::filesystem::path& path, const TextLine& line,
-                         const std::string& fault) {
-  throw Error(
-      fmt::format("'{}', line {}: '{}' {}; a line of a fiducial model is 'x y z', 'contour "
-                  "x y z' or 'object contour x y z', as model2point writes it",
-                  path.string(), line.number, quote(line.text), fault));
+// The file of points, for messages.
+struct PointFile {
+  const std::filesystem::path& path;
+  const char* what;  // "fiducials"
+};
+
+[[noreturn]] void refuse(const PointFile& file, const TextLine& line, const std::string& fault) {
+  throw Error(fmt::format(
+      "'{}', line {}: '{}' {}; a line of the text of {} is 'x y z', 'contour x y z' or 'object "
+      "contour x y z', as model2point writes it",
+      file.path.string(), line.number, quote(line.text), fault, file.what));
 }
 
-FiducialPoint parse_point(const std::filesystem::path& path, const TextLine& line,
+FiducialPoint parse_point(const PointFile& file, const TextLine& line,
                           const std::vector<std::string_view>& words) {
   std::vector<double> numbers;
   for (const std::string_view word : words) {
     const auto number = parse_number(word, base::kLargestPosition_px);
     if (!number) {
-      refuse(path, line, fmt::format("has '{}', which is no position", quote(word)));
+      refuse(file, line, fmt::format("has '{}', which is no position", quote(word)));
     }
     numbers.push_back(*number);
   }
@@ -36,23 +41,25 @@ FiducialPoint parse_point(const std::filesystem::path& path, const TextLine& lin
 
 }  // namespace
 
-std::vector<FiducialPoint> read_fiducial_points(const std::filesystem::path& path) {
+std::vector<FiducialPoint> read_fiducial_points(const std::filesystem::path& path,
+                                                const char* what) {
+  const PointFile file{path, what};
   std::vector<FiducialPoint> points;
   std::size_t num_columns = 0;
   for (const TextLine& line : read_text_lines(path)) {
     const auto words = split_words(line.text);
     if (words.size() < kMinColumns || words.size() > kMaxColumns) {
-      refuse(path, line, fmt::format("has {} columns", words.size()));
+      refuse(file, line, fmt::format("has {} columns", words.size()));
     }
     if (num_columns != 0 && words.size() != num_columns) {
       refuse(
-          path, line,
+          file, line,
           fmt::format("has {} columns where the lines before have {}", words.size(), num_columns));
     }
     num_columns = words.size();
-    points.push_back(parse_point(path, line, words));
+    points.push_back(parse_point(file, line, words));
   }
-  if (points.empty()) throw Error(fmt::format("'{}' holds no fiducial points", path.string()));
+  if (points.empty()) throw Error(fmt::format("'{}' holds no {}", path.string(), what));
   return points;
 }
 

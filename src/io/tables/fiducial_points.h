@@ -16,7 +16,8 @@ struct FiducialPoint {
 
 /// Reads the text that IMOD's model2point writes: `x y z` on each line, or `contour x y z` (option
 /// -contour), or `object contour x y z` (-object). All lines of a file have the same columns.
-/// Throws Error with the file, the line and its text.
-std::vector<FiducialPoint> read_fiducial_points(const std::filesystem::path& path);
+/// Throws Error with the file, the line and its text. `what` says in it what the points are.
+std::vector<FiducialPoint> read_fiducial_points(const std::filesystem::path& path,
+                                                const char* what = "fiducials");
 
 }  // namespace tomofield::io

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -37,6 +38,16 @@ struct Head {
   bool has_x_tilts = false, has_z_factors = false;
 };
 
+// Returns the pixel size that the first line states. Throws Error for one that no image has.
+double stated_pixel_size(const std::filesystem::path& path, const TextLine& line, double size_A) {
+  if (base::is_plausible_pixel_size(size_A)) return size_A;
+  throw Error(fmt::format(
+      "'{}', line {}: '{}' states pixels of {:g} Å, the eighth number, and pixels have {} to {} Å: "
+      "correct it, or delete the numbers from it on",
+      path.string(), line.number, quote(line.text), size_A, base::kPixelSizes_A.low(),
+      base::kPixelSizes_A.high()));
+}
+
 // Parses "columns rows x y dx dy [has x tilts] [pixel size] [has Z factors]".
 Head parse_head(const std::filesystem::path& path, const TextLine& line) {
   constexpr double kMostParts = 1000;
@@ -59,9 +70,65 @@ Head parse_head(const std::filesystem::path& path, const TextLine& line) {
                .parts = {}};
   const auto further = [&](std::size_t i) { return n.size() > i ? n[i] : 0.0; };
   head.has_x_tilts = further(6) > 0;
-  if (base::is_plausible_pixel_size(further(7))) head.grid.pixel_size_A = further(7);
+  if (n.size() > 7) head.grid.pixel_size_A = stated_pixel_size(path, line, n[7]);
   head.has_z_factors = further(8) > 0;
   return head;
+}
+
+// Follows the lines of a file as tiltalign writes them: for each part lists of numbers, each of
+// which ends with a line, and a line of six numbers for each section.
+class Lines {
+ public:
+  Lines(std::span<const TextLine> lines, std::int64_t num_sections)
+      : lines_(lines), num_sections_(num_sections) {}
+
+  // Returns the first line that is none of these; the last one if lines are missing.
+  const TextLine& first_odd(std::int64_t num_parts, std::int64_t lists_of_part) {
+    for (std::int64_t part = 0; part < num_parts; ++part) {
+      for (std::int64_t list = 0; list < lists_of_part; ++list)
+        if (!skip_list(num_sections_)) return odd();
+      for (std::int64_t section = 0; section < num_sections_; ++section)
+        if (!skip_list(kNumbersOfTransform)) return odd();
+    }
+    return odd();
+  }
+
+ private:
+  static constexpr std::int64_t kNumbersOfTransform = 6;
+
+  bool skip_list(std::int64_t count) {
+    for (; count > 0 && at_ < lines_.size(); ++at_) {
+      const std::int64_t of_line = std::ssize(split_words(lines_[at_].text));
+      if (of_line > count || (count == kNumbersOfTransform && of_line < count)) return false;
+      count -= of_line;
+    }
+    return count == 0;
+  }
+  const TextLine& odd() const { return lines_[std::min(at_, lines_.size() - 1)]; }
+
+  std::span<const TextLine> lines_;
+  std::int64_t num_sections_;
+  std::size_t at_ = 1;  // after the head
+};
+
+// Throws Error unless a file has as many numbers as its parts of these sections need.
+void require_count(const std::filesystem::path& path, std::span<const TextLine> lines,
+                   const Head& head, std::int64_t count, std::int64_t num_sections) {
+  const std::int64_t lists = 1 + (head.has_x_tilts ? 1 : 0) + (head.has_z_factors ? 2 : 0);
+  const std::int64_t num_parts = head.grid.columns * head.grid.rows;
+  const std::int64_t of_section = num_parts * (6 + lists);
+  if (count == of_section * num_sections) return;
+  if (count > 0 && count % of_section == 0)
+    throw Error(fmt::format(
+        "'{}' has {} numbers for {} × {} parts, which are {} sections, and the stack has {}: "
+        "give the local alignments of this stack",
+        path.string(), count, head.grid.columns, head.grid.rows, count / of_section, num_sections));
+  const TextLine& odd = Lines(lines, num_sections).first_odd(num_parts, lists);
+  throw Error(fmt::format(
+      "'{}' has {} numbers, and {} × {} parts of the {} sections of the stack have {}: from line "
+      "{} on, '{}', lines or numbers are missing or of another stack",
+      path.string(), count, head.grid.columns, head.grid.rows, num_sections,
+      of_section * num_sections, odd.number, quote(odd.text)));
 }
 
 // Hands out the numbers that follow each other in a file.
@@ -113,16 +180,8 @@ ImodLocal read_imod_local(const std::filesystem::path& path, std::int64_t num_se
     values.insert(values.end(), numbers.begin(), numbers.end());
   }
   ImodLocal& local = head.grid;
-  const std::int64_t of_section = 7 + (head.has_x_tilts ? 1 : 0) + (head.has_z_factors ? 2 : 0);
   const std::int64_t num_parts = local.columns * local.rows;
-  if (std::ssize(values) != num_parts * of_section * num_sections) {
-    throw Error(fmt::format(
-        "'{}' has {} numbers for {} × {} parts, which are {:.6g} sections, and the stack has {}: "
-        "give the local alignments of this stack",
-        path.string(), values.size(), local.columns, local.rows,
-        static_cast<double>(values.size()) / static_cast<double>(num_parts * of_section),
-        num_sections));
-  }
+  require_count(path, lines, head, std::ssize(values), num_sections);
   local.num_sections = num_sections;
   local.parts.resize(static_cast<std::size_t>(num_parts * num_sections));
   Numbers numbers(values);

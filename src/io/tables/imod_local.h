@@ -31,7 +31,7 @@ struct ImodLocal {
 
 /// Reads such a file for a stack of `num_sections`. Its factors of height (Z factors) are skipped:
 /// IMOD applies them with ZFACTORFILE alone. Throws Error if the file has another number of
-/// sections, or a number that cannot be.
+/// sections, with the line where lines or numbers are missing, and for a number that cannot be.
 ImodLocal read_imod_local(const std::filesystem::path& path, std::int64_t num_sections);
 
 }  // namespace tomofield::io
