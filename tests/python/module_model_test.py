@@ -56,6 +56,11 @@ def test_bad_input_is_refused_in_a_sentence(series, model):
     for size in ((2**21, 2**21, 2**22), (2**62, 4, 4), (4, 1, 2**62)):
         with pytest.raises(tomofield.Error, match="too large"):
             model.sample(tomofield.Box((0, 0, 0), size))
+    large = tomofield.Box((0, 0, 0), (20000, 20000, 20000))
+    with pytest.raises(tomofield.Error, match="29802.3 GiB of memory"):
+        model.sample(large)
+    with pytest.raises(tomofield.Error, match="its disk has only"):
+        tomofield.export(model, series.folder / "large.mrc", box=large)
     with pytest.raises(tomofield.Error, match="N rows"):
         model.sample_points([1, 2, 3])
     with pytest.raises(tomofield.Error, match="finite"):
