@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "base/check.h"
+#include "base/interruption.h"
 #include "base/system/memory.h"
 #include "base/threads/parallel.h"
 #include "field/sampling/aligned_rows.h"
@@ -56,6 +57,7 @@ void sample_aligned(const Field& field, const OrientedBox& box, base::Range some
     for (std::int64_t first = 0; first < nz; first += part) {
       const std::int64_t count = std::min(part, nz - first);
       values.assign(static_cast<std::size_t>(count * num_rows * nx), 0.0f);
+      base::allow_interruption();
       rows.decode(leaves, first, count, num_rows, values.data());
       sink({first, count, first_row, num_rows, values});
     }
@@ -93,6 +95,7 @@ void sample_rotated(const Field& field, const OrientedBox& box, base::Range some
     std::vector<float> values;
     values.reserve(static_cast<std::size_t>(num_rows * nx));
     for (std::int64_t row = first_row; row < first_row + num_rows; ++row) {
+      base::allow_interruption();
       for (std::int64_t x = 0; x < nx; ++x)
         values.push_back(static_cast<float>(voxel_density(field, box, x, row, section)));
     }
