@@ -2,8 +2,12 @@
 
 #include <tomofield/error.h>
 
+#include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
+
+#include "base/interruption.h"
 
 namespace tomofield::python {
 namespace {
@@ -47,12 +51,29 @@ Unlocked::Counted::~Counted() {
 
 Unlocked::Unlocked() = default;
 
+// Ends work that has no callback once the interpreter ends, or by what a handler of signals raises.
+// Only one thread in a tenth of a second takes the interpreter's lock.
+void interrupt() {
+  using Clock = std::chrono::steady_clock;
+  static std::atomic<Clock::rep> next{0};
+  if (must_stop()) throw Error("the Python interpreter ends");
+  const Clock::time_point now = Clock::now();
+  Clock::rep due = next;
+  if (now.time_since_epoch().count() < due ||
+      !next.compare_exchange_strong(
+          due, (now + std::chrono::milliseconds(100)).time_since_epoch().count()))
+    return;
+  const py::gil_scoped_acquire locked;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+}
+
 bool must_stop() {
   const std::lock_guard lock(calls().mutex);
   return calls().is_over;
 }
 
 void wait_at_exit() {
+  base::set_interruption(interrupt);
   py::module_::import("atexit").attr("register")(py::cpp_function(&wait_for_calls));
 }
 

@@ -9,8 +9,8 @@ namespace tomofield::python {
 /// A daemon thread may be in C++ when the interpreter ends. Python would end that thread at its
 /// next wish for the lock, through C++ that cannot be unwound, and the process would abort. So the
 /// interpreter waits for all objects of this class before it ends (wait_at_exit()), reconstructions
-/// stop at their next step (must_stop()), and none can be made afterwards: the constructor throws
-/// Error.
+/// stop at their next step (must_stop()), sampling at its next part, and none can be made
+/// afterwards: the constructor throws Error.
 class Unlocked {
  public:
   Unlocked();
@@ -29,7 +29,7 @@ class Unlocked {
 /// Returns true once the interpreter ends.
 bool must_stop();
 
-/// Lets the interpreter wait at its end for what runs in C++.
+/// Lets the interpreter wait at its end for what runs in C++, and Ctrl-C stop what has no callback.
 void wait_at_exit();
 
 }  // namespace tomofield::python

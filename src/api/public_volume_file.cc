@@ -93,7 +93,7 @@ void write_mrc(const Tomogram& volume, const std::filesystem::path& path, bool o
     throw Error(fmt::format("voxels of {} Å cannot be written: give their size, from {} to {} Å",
                             volume.voxel_size_A, base::kPixelSizes_A.low(),
                             base::kPixelSizes_A.high()));
-  if (nx < 1 || ny < 1 || nz < 1 || std::ssize(volume.values) != nx * ny * nz)
+  if (nx < 1 || ny < 1 || nz < 1 || !(base::CheckedSize(nx) * ny * nz).is(volume.values.size()))
     throw Error(fmt::format("{} values are not a volume of {} × {} × {} voxels",
                             volume.values.size(), nx, ny, nz));
   const std::vector<io::OutputLock> locks = claim(path, overwrite);

@@ -8,6 +8,7 @@
 #include <cstdlib>
 
 #include "base/code_text.h"
+#include "base/plausible.h"
 #include "base/system/child_process.h"
 #include "batch/packing.h"
 #include "batch/state_record.h"
@@ -24,11 +25,11 @@ constexpr double kMoreMemory = 1.2;  // estimates are within 10 %
 constexpr double kMoreTime = 3;      // nodes differ, and others use them too
 constexpr double kLeastMinutes = 15;
 
-// Returns a positive whole number of the environment.
-std::optional<std::int64_t> number_in_environment(const char* name) {
+// Returns a whole number of the environment from 1 to `most`.
+std::optional<std::int64_t> number_in_environment(const char* name, std::int64_t most) {
   const char* text = std::getenv(name);
   const auto number = text == nullptr ? std::nullopt : io::parse_integer(text);
-  return number && *number > 0 ? number : std::nullopt;
+  return number && *number > 0 && *number <= most ? number : std::nullopt;
 }
 
 // The language of the script. A text from outside becomes one word of it.
@@ -91,13 +92,15 @@ Script line_for_sbatch(const std::string& option) {
 
 SlurmGrant slurm_grant() {
   if (std::getenv("SLURM_JOB_ID") == nullptr) return {};
+  constexpr std::int64_t kMostThreads = 1 << 20, kMostMebibytes = std::int64_t{1} << 40;
   SlurmGrant grant;
-  if (const auto cpus = number_in_environment("SLURM_CPUS_PER_TASK"))
+  if (const auto cpus = number_in_environment("SLURM_CPUS_PER_TASK", kMostThreads))
     grant.threads = static_cast<int>(*cpus);
-  if (const auto of_node = number_in_environment("SLURM_MEM_PER_NODE"))
+  if (const auto of_node = number_in_environment("SLURM_MEM_PER_NODE", kMostMebibytes))
     grant.memory_bytes = *of_node * kMebibyte;
-  else if (const auto of_cpu = number_in_environment("SLURM_MEM_PER_CPU"))
-    grant.memory_bytes = *of_cpu * kMebibyte * grant.threads.value_or(1);
+  else if (const auto of_cpu = number_in_environment("SLURM_MEM_PER_CPU", kMostMebibytes))
+    grant.memory_bytes =
+        (base::CheckedSize(*of_cpu) * kMebibyte * grant.threads.value_or(1)).find();
   return grant;
 }
 

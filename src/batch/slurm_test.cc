@@ -90,5 +90,17 @@ TEST_F(SlurmGrantTest, IsThatOfTheJob) {
   EXPECT_FALSE(slurm_grant().threads.has_value());
 }
 
+TEST_F(SlurmGrantTest, HasNoNumbersThatNoMachineHas) {
+  ::setenv("SLURM_JOB_ID", "7", 1);
+  ::setenv("SLURM_CPUS_PER_TASK", "2147483648", 1);
+  ::setenv("SLURM_MEM_PER_NODE", "9223372036854775807", 1);
+  EXPECT_FALSE(slurm_grant().threads.has_value());
+  EXPECT_FALSE(slurm_grant().memory_bytes.has_value());
+  ::unsetenv("SLURM_MEM_PER_NODE");
+  ::setenv("SLURM_CPUS_PER_TASK", "1000000", 1);
+  ::setenv("SLURM_MEM_PER_CPU", "1000000000000", 1);  // 10²⁴ bytes in all
+  EXPECT_FALSE(slurm_grant().memory_bytes.has_value());
+}
+
 }  // namespace
 }  // namespace tomofield::batch

@@ -37,14 +37,16 @@ void require_free_name(const std::string& name) {
 Method parse_method(const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::string name = text.substr(0, equals);
-  const bool can_be_a_file = !name.empty() && std::ranges::all_of(name, [](unsigned char c) {
-    return std::isalnum(c) || c == '-' || c == '_';
-  });
+  // A name that begins with '-' would be an option, or a formula in a table.
+  const bool can_be_a_file =
+      !name.empty() && name.front() != '-' && std::ranges::all_of(name, [](unsigned char c) {
+        return std::isalnum(c) || c == '-' || c == '_';
+      });
   if (equals == std::string::npos || !can_be_a_file) {
-    throw Error(
-        fmt::format("--also '{}': give NAME=COMMAND, the name of letters, digits, - and _, such as "
-                    "'smooth=reconstruct --tv-penalty smooth'",
-                    text));
+    throw Error(fmt::format(
+        "--also '{}': give NAME=COMMAND, the name of letters, digits, _ and - (not first), such "
+        "as 'smooth=reconstruct --tv-penalty smooth'",
+        text));
   }
   require_free_name(name);
   Method method{.name = name, .title = name, .arguments = {}};

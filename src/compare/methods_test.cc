@@ -41,6 +41,8 @@ TEST(Methods, HaveNoNamesOfTheComparisonsOwnFiles) {
   for (const char* name : {"comparison", "report", "pictures", "truth", "vm_tune", "vm.even",
                            "vm.odd", "vm.held_out", "../vm", ""})
     EXPECT_THROW(choose_methods({}, {std::string(name) + "=baseline wbp"}), Error) << name;
+  for (const char* name : {"-x", "--config", "=1+1", "+1", "@a", ""})
+    EXPECT_THROW(choose_methods({}, {std::string(name) + "=baseline wbp"}), Error) << name;
   EXPECT_NO_THROW(choose_methods({}, {"truthful=baseline wbp"}));
 }
 

@@ -73,14 +73,54 @@ SlabViews::SlabViews(const Shape& shape, const Holding& holding,
       holding_(holding),
       memory_(num_lines() * (kRayBytes + kMaskBytes), "the prepared rays", scratch_dir,
               in_memory_bytes),
-      rays_(reinterpret_cast<float*>(memory_.data())),
-      mask_(reinterpret_cast<std::uint16_t*>(rays_ + num_lines() * kLanes)) {}
+      rays_(reinterpret_cast<const float*>(memory_.data())),
+      mask_(reinterpret_cast<const std::uint16_t*>(rays_ + num_lines() * kLanes)) {}
 
 SlabViews::SlabViews(const Shape& shape, const Holding& holding, double unit,
                      const ReadViews& read_views, const std::filesystem::path& scratch_dir,
                      std::size_t in_memory_bytes)
     : SlabViews(shape, holding, scratch_dir, in_memory_bytes) {
   fill(unit, read_views);
+}
+
+// Lines that are made before they are stored.
+struct SlabViews::Lines {
+  explicit Lines(std::size_t count) : rays(count * kLanes), mask(count) {}
+
+  void set(std::size_t line, int lane, float value) {
+    rays[line * kLanes + static_cast<std::size_t>(lane)] = value;
+    mask[line] = static_cast<std::uint16_t>(mask[line] | 1u << lane);
+  }
+
+  void hide_where_hidden(const std::uint16_t* other) {
+    for (std::size_t at = 0; at < mask.size(); ++at) {
+      mask[at] = static_cast<std::uint16_t>(mask[at] & other[at]);
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        if ((mask[at] >> lane & 1) == 0) rays[at * kLanes + lane] = 0.0f;
+    }
+  }
+
+  void subtract(float value) {
+    for (std::size_t at = 0; at < mask.size(); ++at)
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        if (mask[at] >> lane & 1) rays[at * kLanes + lane] -= value;
+  }
+
+  std::vector<float> rays;
+  std::vector<std::uint16_t> mask;
+};
+
+SlabViews::Lines SlabViews::copy(int slab, int view) const {
+  Lines lines(static_cast<std::size_t>(shape_.width));
+  std::copy_n(rays(slab, view), lines.rays.size(), lines.rays.begin());
+  std::copy_n(mask(slab, view), lines.mask.size(), lines.mask.begin());
+  return lines;
+}
+
+void SlabViews::store(std::size_t first_line, const Lines& lines) {
+  memory_.write(first_line * kRayBytes, std::as_bytes(std::span(lines.rays)));
+  memory_.write(num_lines() * kRayBytes + first_line * kMaskBytes,
+                std::as_bytes(std::span(lines.mask)));
 }
 
 std::size_t SlabViews::num_lines() const {
@@ -137,12 +177,14 @@ void SlabViews::fill(double unit, const ReadViews& read_views) {
 }
 
 void SlabViews::set_rows(int slab, int view, const ViewBuffer& from, float per_unit) {
-  const std::size_t width = static_cast<std::size_t>(shape_.width), to = line(slab, view);
+  const auto width = static_cast<std::size_t>(shape_.width);
+  Lines lines(width);
   for (int lane = 0; lane < rows_of(slab); ++lane) {
     const std::size_t row = static_cast<std::size_t>(shape_.first_row + slab * kRows + lane);
     for (std::size_t x = 0, at = row * width; x < width; ++x, ++at)
-      if (from.valid[at]) set_ray(to + x, lane, from.image[at] * per_unit);
+      if (from.valid[at]) lines.set(x, lane, from.image[at] * per_unit);
   }
+  store(line(slab, view), lines);
 }
 
 SlabViews::Shape SlabViews::binned_shape(const Shape& shape, int bin) {
@@ -168,7 +210,7 @@ std::unique_ptr<SlabViews> SlabViews::binned(int bin) const {
 // Sets the rays of a slab of a view to means of `fine`, in units `bin` times as large.
 void SlabViews::set_means(int slab, int view, const SlabViews& fine, int bin) {
   const float per_unit = static_cast<float>(1.0 / bin);
-  const std::size_t to = line(slab, view);
+  Lines lines(static_cast<std::size_t>(shape_.width));
   std::vector<double> sums(static_cast<std::size_t>(shape_.width));
   std::vector<int> counts(sums.size());
   for (int lane = 0; lane < rows_of(slab); ++lane) {
@@ -179,8 +221,9 @@ void SlabViews::set_means(int slab, int view, const SlabViews& fine, int bin) {
       fine.add_row(view, y, bin, sums, counts);
     for (std::size_t x = 0; x < sums.size(); ++x)
       if (2 * counts[x] >= bin * bin)
-        set_ray(to + x, lane, static_cast<float>(sums[x] / counts[x]) * per_unit);
+        lines.set(x, lane, static_cast<float>(sums[x] / counts[x]) * per_unit);
   }
+  store(line(slab, view), lines);
 }
 
 // Adds the rays of a row that count to the sums of `bin` neighbours each, and counts them.
@@ -208,11 +251,12 @@ void SlabViews::set_view(int view, std::span<const float> image) {
   const Slabs held = holding_.all();
   base::parallel_for("set view", held.size(), [&](std::int64_t i) {
     const int slab = held.begin + static_cast<int>(i);
-    const std::size_t to = line(slab, view);
+    Lines lines(static_cast<std::size_t>(shape_.width));
     for (std::int64_t x = 0; x < shape_.width; ++x)
       for (int lane = 0; lane < rows_of(slab); ++lane)
-        set_ray(to + static_cast<std::size_t>(x), lane,
-                image[static_cast<std::size_t>((slab * kRows + lane) * shape_.width + x)]);
+        lines.set(static_cast<std::size_t>(x), lane,
+                  image[static_cast<std::size_t>((slab * kRows + lane) * shape_.width + x)]);
+    store(line(slab, view), lines);
   });
 }
 
@@ -234,23 +278,31 @@ std::unique_ptr<SlabViews> SlabViews::rows(base::Range rows, std::span<const int
 // Copies the own rows of `from`; the first row of all is `first_row` of `from`.
 void SlabViews::copy_rows(int slab, int view, const SlabViews& from, int from_view,
                           std::int64_t first_row) {
-  const std::size_t to = line(slab, view);
+  Lines lines(static_cast<std::size_t>(shape_.width));
   for (int lane = 0; lane < rows_of(slab); ++lane) {
     const std::int64_t y = first_row + slab * kRows + lane;
     if (y < from.own_rows().begin || y >= from.own_rows().end) continue;
     for (std::int64_t x = 0; x < shape_.width; ++x)
       if (from.counts(from_view, x, y))
-        set_ray(to + static_cast<std::size_t>(x), lane, from.ray(from_view, x, y));
+        lines.set(static_cast<std::size_t>(x), lane, from.ray(from_view, x, y));
   }
+  store(line(slab, view), lines);
 }
 
 // Gives the rays that any of the processes has to all of them.
 void SlabViews::share(const distributed::Communicator& processes) {
   if (processes.size() == 1) return;
-  processes.allreduce_sum(std::span(rays_, num_lines() * kLanes));
-  std::vector<std::int64_t> masks(mask_, mask_ + num_lines());  // no two have the same bit
-  processes.allreduce_sum(std::span(masks));
-  std::ranges::copy(masks, mask_);
+  for (int slab = own().begin; slab < own().end; ++slab) {
+    for (int view = 0; view < num_views(); ++view) {
+      Lines lines = copy(slab, view);
+      processes.allreduce_sum(std::span(lines.rays));
+      std::vector<std::int64_t> masks(lines.mask.begin(), lines.mask.end());
+      processes.allreduce_sum(std::span(masks));  // no two have the same bit
+      std::ranges::transform(masks, lines.mask.begin(),
+                             [](std::int64_t mask) { return static_cast<std::uint16_t>(mask); });
+      store(line(slab, view), lines);
+    }
+  }
 }
 
 std::int64_t SlabViews::num_valid(int view) const {
@@ -294,10 +346,10 @@ void SlabViews::hide_where_hidden(const SlabViews& other) {
   TOMOFIELD_CHECK(other.num_lines() == num_lines(), "the same shape and slabs");
   base::parallel_for("hide rays", held.size(), [&](std::int64_t i) {
     const int slab = held.begin + static_cast<int>(i);
-    for (std::size_t at = line(slab, 0); at < line(slab + 1, 0); ++at) {
-      mask_[at] = static_cast<std::uint16_t>(mask_[at] & other.mask_[at]);
-      for (std::size_t lane = 0; lane < kRows; ++lane)
-        if ((mask_[at] >> lane & 1) == 0) rays_[at * kRows + lane] = 0.0f;
+    for (int view = 0; view < num_views(); ++view) {
+      Lines lines = copy(slab, view);
+      lines.hide_where_hidden(other.mask(slab, view));
+      store(line(slab, view), lines);
     }
     release(slab);
     other.release(slab);
@@ -308,9 +360,10 @@ void SlabViews::subtract(float value) {
   const Slabs held = holding_.all();
   base::parallel_for("subtract from rays", held.size(), [&](std::int64_t i) {
     const int slab = held.begin + static_cast<int>(i);
-    for (std::size_t at = line(slab, 0); at < line(slab + 1, 0); ++at) {
-      for (std::size_t lane = 0; lane < kRows; ++lane)
-        if (mask_[at] >> lane & 1) rays_[at * kRows + lane] -= value;
+    for (int view = 0; view < num_views(); ++view) {
+      Lines lines = copy(slab, view);
+      lines.subtract(value);
+      store(line(slab, view), lines);
     }
     release(slab);
   });
@@ -319,8 +372,11 @@ void SlabViews::subtract(float value) {
 void SlabViews::clear_ray(int view, std::int64_t x, std::int64_t y) {
   const std::size_t at = line(static_cast<int>(y / kRows), view) + static_cast<std::size_t>(x);
   const auto lane = static_cast<std::size_t>(y % kRows);
-  rays_[at * kRows + lane] = 0.0f;
-  mask_[at] = static_cast<std::uint16_t>(mask_[at] & ~(1u << lane));
+  const auto mask = static_cast<std::uint16_t>(mask_[at] & ~(1u << lane));
+  if (mask == mask_[at]) return;  // its ray is 0
+  const float zero = 0.0f;
+  memory_.write((at * kRows + lane) * sizeof(float), std::as_bytes(std::span(&zero, 1)));
+  memory_.write(num_lines() * kRayBytes + at * kMaskBytes, std::as_bytes(std::span(&mask, 1)));
 }
 
 std::uint64_t SlabViews::checksum_of(int slab) const {

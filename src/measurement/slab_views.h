@@ -54,8 +54,8 @@ class SlabViews {
   /// Returns the bytes of the rays and their masks.
   static std::size_t bytes(const Shape& shape);
 
-  /// Reads every view and divides its intensities by `unit`. Throws Error if the scratch file
-  /// cannot be made.
+  /// Reads every view and divides its intensities by `unit`. This and all that makes or changes
+  /// views throws Error if the scratch file cannot be made or written.
   SlabViews(const Shape& shape, double unit, ReadView read_view,
             const std::filesystem::path& scratch_dir,
             std::size_t in_memory_bytes = io::ScratchMemory::kInMemoryBytes)
@@ -133,10 +133,9 @@ class SlabViews {
   void set_rows(int slab, int view, const ViewBuffer& from, float per_unit);
   void set_means(int slab, int view, const SlabViews& fine, int bin);
   void copy_rows(int slab, int view, const SlabViews& from, int from_view, std::int64_t first_row);
-  void set_ray(std::size_t line, int lane, float value) {
-    rays_[line * kRows + static_cast<std::size_t>(lane)] = value;
-    mask_[line] = static_cast<std::uint16_t>(mask_[line] | 1u << lane);
-  }
+  struct Lines;
+  Lines copy(int slab, int view) const;
+  void store(std::size_t first_line, const Lines& lines);
   void add_row(int view, std::int64_t y, int bin, std::span<double> sums,
                std::span<int> counts) const;
   void share(const distributed::Communicator& processes);
@@ -152,8 +151,8 @@ class SlabViews {
   std::filesystem::path scratch_dir_;
   Holding holding_;
   io::ScratchMemory memory_;
-  float* rays_;
-  std::uint16_t* mask_;
+  const float* rays_;
+  const std::uint16_t* mask_;
 };
 
 }  // namespace tomofield::measurement

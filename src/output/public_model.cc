@@ -99,7 +99,10 @@ SampleBox Model::region(double voxel_px) const {
 }
 
 std::vector<float> Model::sample(const SampleBox& box) const {
-  auto values = output::sample_box(impl_->model, oriented_box(box));
+  const field::OrientedBox oriented = oriented_box(box);
+  field::require_memory_of(oriented);
+  output::announce_sampling(impl_->model, oriented);
+  auto values = output::sample_box(impl_->model, oriented);
   output::to_output(impl_->model, values);
   return values;
 }

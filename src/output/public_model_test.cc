@@ -1,16 +1,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "field/sampling/sample_box.h"
 #include "io/images/mrc.h"
 #include "output/model_file.h"
+#include "output/sample_model.h"
 #include "output/volume.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 #include "tomofield/model.h"
 #include "uneven_model.h"
+#include "warning_catcher.h"
 
 namespace tomofield {
 namespace {
@@ -45,6 +48,32 @@ TEST(PublicModel, TurnsBoxesByEulerAngles) {
       {.centre_px = {30, 40, 10}, .size = {5, 1, 1}, .voxel_px = 1.0, .euler_deg = {90, 0, 0}});
   for (std::size_t x = 0; x < 5; ++x)
     EXPECT_NEAR(values[x], 40.0 * inner.field->density(30, 42 - static_cast<double>(x), 10), 1e-4);
+}
+
+TEST(PublicModel, RefusesBoxesLargerThanTheMemory) {
+  const testing::ScratchDirectory scratch;
+  output::save_model(scratch / "model.h5", testing::uneven_model(FieldKind::kVm));
+  const Model model(scratch / "model.h5");
+  const std::string message = testing::message_of<Error>([&] {
+    (void)model.sample({.centre_px = {60, 60, 10}, .size = {20000, 20000, 20000}});
+  });
+  EXPECT_NE(message.find("20000 × 20000 × 20000 voxels needs about 29802.3 GiB of memory"),
+            std::string::npos)
+      << message;
+}
+
+TEST(PublicModel, SaysHowLongALargeBoxTakes) {
+  const auto model = testing::uneven_model(FieldKind::kVm);
+  const field::OrientedBox box{.centre_px = {60, 60, 10},
+                               .size = {10000, 10000, 90000},
+                               .field_from_box = field::rotation_from_euler(10, 20, 30)};
+  const testing::WarningCatcher warnings;
+  output::announce_sampling(model, {.centre_px = box.centre_px, .size = {100, 100, 100}});
+  EXPECT_EQ(warnings.text(), "");
+  output::announce_sampling(model, box);
+  EXPECT_NE(warnings.text().find("sampling 10000 × 10000 × 90000 voxels may take about"),
+            std::string::npos)
+      << warnings.text();
 }
 
 TEST(PublicModel, SamplesPoints) {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/trace.h"
@@ -156,7 +157,7 @@ void write_zarr(const std::filesystem::path& volume, ZarrVersion version) {
 
 void check_zarr(const std::filesystem::path& volume, bool may_replace, const std::string& advice) {
   const std::filesystem::path zarr = zarr_path(volume);
-  io::require_replaceable_folder(zarr, io::kZarrMarker);
+  io::require_replaceable_zarr(zarr);
   if (!may_replace && std::filesystem::exists(zarr))
     throw Error(fmt::format("'{}' exists: {}", zarr.string(), advice));
 }
@@ -181,8 +182,15 @@ void write_volume(const Model& model, const VolumeOptions& options,
   const OrientedBox box = part.box.value_or(region_box(model, 1.0));
   field::require_feasible(box);
   require_inside(model, BoxBounds(box));
-  write_voxels([&](const field::BoxSink& sink) { sample_box(model, box, sink); }, box, model,
-               kMadeBy, options, path, distributed::Communicator::alone(), part.largest_density);
+  const bool is_integer = options.voxel_type == VoxelType::kInt16;
+  const std::size_t passes = is_integer && !part.largest_density ? 2 : 1;
+  bool is_announced = !part.box;  // an export is, once its file can be written
+  const auto source = [&](const field::BoxSink& sink) {
+    if (!std::exchange(is_announced, true)) announce_sampling(model, box, passes);
+    sample_box(model, box, sink);
+  };
+  write_voxels(source, box, model, kMadeBy, options, path, distributed::Communicator::alone(),
+               part.largest_density);
 }
 
 void write_volume(Model& model, const VolumeOptions& options, const std::filesystem::path& path,

@@ -162,10 +162,11 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& s
   }
   const auto& [in_header_A, height_A, depth_A] = stack.header().voxel_size_A;
   if (height_A > 0.0 && std::fabs(in_header_A - height_A) > 0.001 * std::fabs(in_header_A))
-    throw Error(fmt::format(
-        "'{}' has pixels of {} × {} Å, and only square ones can be reconstructed: give their size "
-        "with --pixel-size if the header is wrong",
-        stack.name(), in_header_A, height_A));
+    throw Error(
+        fmt::format("'{}' has pixels of {:.6g} × {:.6g} Å, and only square ones can be "
+                    "reconstructed: give their size "
+                    "with --pixel-size if the header is wrong",
+                    stack.name(), in_header_A, height_A));
   const bool is_default = in_header_A == 0.0 || in_header_A == 1.0;
   if (is_default && mdoc) {
     const double stated_A = pixel_size_of_mdoc(*mdoc, *options.mdoc, stack);

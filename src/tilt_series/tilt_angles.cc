@@ -69,18 +69,19 @@ std::string describe_steep(const TiltAngles& angles, const std::vector<std::int6
 }
 
 void require_different(const TiltAngles& angles, std::span<const std::int64_t> sections) {
-  const auto tilt_deg = [&](std::int64_t section) {
-    return angles.of_section[static_cast<std::size_t>(section)]->value;
-  };
+  constexpr double kLeastSpan_deg = 0.1;  // stages are less exact
   if (sections.size() < 2) return;
-  if (std::ranges::any_of(sections, [&](std::int64_t section) {
-        return tilt_deg(section) != tilt_deg(sections.front());
-      }))
-    return;
-  throw Error(
-      fmt::format("'{}': the tilts of all {} sections are {}°, which is no tilt series: give the "
-                  "file of the tilt angles with --tlt",
-                  angles.source, sections.size(), tilt_deg(sections.front()) + 0.0));
+  const auto [low, high] = std::ranges::minmax(sections, {}, [&](std::int64_t section) {
+    return angles.of_section[static_cast<std::size_t>(section)]->value;
+  });
+  const double lowest = angles.of_section[static_cast<std::size_t>(low)]->value;
+  const double highest = angles.of_section[static_cast<std::size_t>(high)]->value;
+  if (highest - lowest >= kLeastSpan_deg) return;
+  throw Error(fmt::format(
+      "'{}': the tilts of all {} sections are {:.6g}°{}, which is no tilt series: give the file of "
+      "the tilt angles with --tlt",
+      angles.source, sections.size(), lowest + 0.0,
+      highest > lowest ? fmt::format(" to {:.6g}°", highest) : ""));
 }
 
 }  // namespace

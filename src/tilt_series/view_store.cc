@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "base/check.h"
 
@@ -35,11 +36,15 @@ void ViewStore::write(std::size_t view, const MaskedImage& image) {
   TOMOFIELD_CHECK(!holds(view), "the view was written before");
   const std::size_t place = used_.fetch_add(view_bytes());
   TOMOFIELD_CHECK(place + view_bytes() <= memory_.size(), "there is no room");
+  std::vector<float> row(static_cast<std::size_t>(width_));
+  for (std::size_t first = 0; first < image.values.size(); first += row.size()) {
+    for (std::size_t x = 0; x < row.size(); ++x)
+      row[x] = image.valid[first + x] ? image.values[first + x]
+                                      : std::numeric_limits<float>::quiet_NaN();
+    memory_.write(place + first * sizeof(float), std::as_bytes(std::span(row)));
+  }
   place_[view] = place;
-  float* to = reinterpret_cast<float*>(memory_.data() + place_[view]);
-  for (std::size_t i = 0; i < image.values.size(); ++i)
-    to[i] = image.valid[i] ? image.values[i] : std::numeric_limits<float>::quiet_NaN();
-  memory_.release(place_[view], view_bytes());
+  memory_.release(place, view_bytes());
 }
 
 MaskedImage ViewStore::read(std::size_t view) const {

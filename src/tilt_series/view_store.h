@@ -21,6 +21,7 @@ class ViewStore {
   ViewStore(std::size_t num_views, std::size_t capacity, std::int64_t width, std::int64_t height,
             const std::filesystem::path& scratch_dir);
 
+  /// Throws Error if the scratch file cannot be written.
   void write(std::size_t view, const MaskedImage& image);
   /// Returns true if a view was written and not discarded.
   bool holds(std::size_t view) const { return place_[view] != kNowhere; }

@@ -469,6 +469,18 @@ def test_strips_are_no_views(tmp_path):
         assert result.returncode == 2 and "views of 32 × 1 pixels" in result.stderr, result.stderr
 
 
+def test_oblong_pixels_are_refused(refuse_series, patched_stack):
+    for at, pixels, size in ((40, NX, 20), (44, NY, 5), (44, NY, 10.1)):
+        stack = patched_stack("oblong.mrc", (at, np.float32(pixels * size).tobytes()))
+        refuse_series(["only square ones", "--pixel-size", f" {size:g} "], stack)
+
+
+def test_tilts_that_hardly_differ_are_no_series(refuse_series, stack, text_file):
+    for step in (0, 1e-9, 1e-3):
+        file = text_file("equal.tlt", "".join(f"{step * i:.9f}\n" for i in range(NUM_VIEWS)))
+        refuse_series([file, "no tilt series", str(NUM_VIEWS)], stack, "--tlt", file)
+
+
 def test_x_axis_tilts_and_bins_that_make_no_sense(refuse_series, stack, text_file):
     for tilt in ("91", "-80.5"):
         file = text_file("steep.xtilt", "0\n" * 3 + tilt + "\n" + "0\n" * (NUM_VIEWS - 4))

@@ -1,8 +1,10 @@
 """Tests runs where the system gives little: in a read-only container with no user of the machine, no
 home, no /tmp and a small /dev/shm, and on file systems that do not tell the truth about their space."""
 
+import errno
 import os
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -134,7 +136,7 @@ def library(tmp_path_factory):
 
 
 def on_small_disk(folder, kibibytes, environment, *command):
-    """Runs the program with a small disk at `folder`. Returns the run, and the names of the files that
+    """Runs a command with a small disk at `folder`. Returns the run, and the names of the files that
     it left there. Skips the test where no disk can be mounted."""
     mount = [*namespace(), "sh", "-c", 'mount -t tmpfs -o size="$1"k none "$2" && shift 2 && "$@"', "sh",
              str(kibibytes), folder]
@@ -144,7 +146,7 @@ def on_small_disk(folder, kibibytes, environment, *command):
     script = 'cd "$1" && shift; "$@"; status=$?; echo; echo "left: $(ls -A | tr "\\n" " ")"; exit $status'
     ended = subprocess.run([*mount, "sh", "-c", script, "sh", folder, "env",
                             *[f"{key}={value}" for key, value in environment.items()],
-                            harness.PROGRAM, *map(str, command)], capture_output=True, text=True)
+                            *map(str, command)], capture_output=True, text=True)
     return ended, ended.stdout.splitlines()[-1].removeprefix("left: ").split()
 
 
@@ -158,25 +160,59 @@ def test_a_disk_that_says_it_is_full_is_written_with_a_warning(library, series):
 
 def test_a_disk_that_says_it_has_room_ends_in_one_sentence(library, series, tmp_path):
     ended, left = on_small_disk(tmp_path, 64, {"LD_PRELOAD": library, "FAULT_FREE": str(1 << 50)},
-                                "reconstruct", *series.input, *QUICK, "-o", "out.mrc")
+                                harness.PROGRAM, "reconstruct", *series.input, *QUICK, "-o", "out.mrc")
     said = [line for line in ended.stderr.splitlines() if line.startswith("tomofield: ")]
     assert ended.returncode == 2 and len(said) == 1 and "out." in said[0], ended
     assert "No space left on device" in said[0] and left == [], (said, left)
 
 
-def test_a_scratch_file_that_has_no_room_after_all_ends_in_one_sentence(library, tmp_path):
-    """The disk says that it has reserved a scratch file of more than 1 GiB, and has not."""
-    stack, tilts, disk = tmp_path / "large.mrc", tmp_path / "large.tlt", tmp_path / "disk"
-    disk.mkdir()
+@pytest.fixture(scope="module")
+def large_series():
+    """Returns a stack and its tilts, whose views need a scratch file of more than 1 GiB."""
+    stack, tilts = os.path.abspath("large.mrc"), os.path.abspath("large.tlt")
     view = np.random.default_rng(1).integers(0, 100, (4096, 4096)).astype(np.int8)
     harness.write_stack(stack, np.broadcast_to(view, (17, 4096, 4096)))
     np.savetxt(tilts, np.linspace(-48, 48, 17))
-    ended, left = on_small_disk(disk, 4096, {"LD_PRELOAD": library, "FAULT_RESERVE": "1"},
-                                "reconstruct", stack, "--tlt", tilts, "--thickness", 16,
-                                "--contrast", "bright", "--no-margin", "--tv", 1, "--epochs", 1,
-                                "-o", disk / "out.mrc")
-    stack.unlink()
+    yield stack, tilts
+    os.unlink(stack)
+
+
+@pytest.mark.parametrize("reserve, says", (("lies", "less room than it said"),
+                                           (str(errno.EOPNOTSUPP), "cannot reserve")))
+def test_a_scratch_file_without_room_ends_in_one_sentence(library, large_series, tmp_path, reserve,
+                                                          says):
+    """The disk says that it has reserved room, and has not; or it cannot reserve any."""
+    stack, tilts = large_series
+    ended, left = on_small_disk(tmp_path, 4096, {"LD_PRELOAD": library, "FAULT_RESERVE": reserve},
+                                harness.PROGRAM, "reconstruct", stack, "--tlt", tilts, "--thickness",
+                                16, "--contrast", "bright", "--no-margin", "--tv", 1, "--epochs", 1,
+                                "-o", tmp_path / "out.mrc")
     said = [line for line in ended.stderr.splitlines() if line.startswith("tomofield: ")]
     assert ended.returncode == 2 and len(said) == 1, ended
-    assert str(disk) in said[0] and "less room than it said" in said[0], said
+    assert str(tmp_path) in said[0] and says in said[0], said
+    assert not [name for name in left if not name.endswith("-lock")], left
+
+
+LIBRARY = """
+import sys
+import tomofield
+stack, tilts, output = sys.argv[1:]
+try:
+    tomofield.reconstruct(stack, tlt=tilts, thickness=16, contrast="bright", with_margin=False,
+                          density_variation=1, epochs=1, output=output)
+except tomofield.Error as error:
+    print("the host lives, and knows:", error)
+"""
+
+
+def test_a_scratch_file_without_room_throws_in_the_library(library, large_series, tmp_path):
+    """The library has no handler of signals: the process of its user must not end."""
+    module = os.path.join(os.path.dirname(os.path.abspath(harness.PROGRAM)), "python")
+    if not os.path.exists(module):
+        pytest.skip("the Python module was not built")
+    ended, left = on_small_disk(tmp_path, 4096, {"LD_PRELOAD": library, "FAULT_RESERVE": "lies",
+                                                 "PYTHONPATH": module},
+                                sys.executable, "-c", LIBRARY, *large_series, tmp_path / "out.mrc")
+    assert ended.returncode == 0 and "the host lives" in ended.stdout, ended
+    assert str(tmp_path) in ended.stdout and "less room than it said" in ended.stdout, ended
     assert not [name for name in left if not name.endswith("-lock")], left

@@ -7,6 +7,7 @@ import io
 import os
 import pathlib
 import shutil
+import subprocess
 
 import h5py
 import mrcfile
@@ -89,6 +90,26 @@ def test_a_box_that_no_machine_samples_is_refused_before_the_work():
                                "2147483647,2147483647,4")
     assert result.returncode == 2 and "too large" in result.stderr
     assert not pathlib.Path("large.mrc").exists()
+
+
+@pytest.mark.parametrize("size, says", (("20000,20000,10000", "its disk has only"),
+                                        ("1,1000000,1000000", "GiB of memory"),
+                                        ("2147483647,1,1000", "its disk has only")))
+def test_a_volume_larger_than_its_disk_or_the_memory_is_refused_before_the_work(size, says):
+    result = harness.tomofield("export", "model.h5", "-o", "large.mrc", "--center", "16,16,8", "--size",
+                               size, timeout=60)
+    assert result.returncode == 2 and says in result.stderr, result.stderr
+    assert not pathlib.Path("large.mrc").exists()
+
+
+def test_a_long_export_says_how_long_before_the_work():
+    command = [harness.PROGRAM, "export", "model.h5", "-o", "long.mrc", "--center", "16,16,8", "--size",
+               "2000,2000,2000", "--rotate", "10,20,30"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as running:
+        said = next((line for line in running.stderr if "may take about" in line), None)
+        running.terminate()
+        running.stderr.read()
+    assert said and "2000 × 2000 × 2000 voxels" in said
 
 
 def test_a_box_outside_the_region_of_interest_has_a_warning():

@@ -11,7 +11,8 @@
 //   FAULT_COUNT   the file in which the number of such calls is written when the program ends
 //   FAULT_LARGE   allocations of more bytes than this count
 //   FAULT_FREE    the bytes that every file system says it has left; -1 lets it tell the truth
-//   FAULT_RESERVE if it is set, file systems say that they have reserved room, and have not
+//   FAULT_RESERVE "lies": file systems say that they have reserved room, and have not; or the error
+//                 that they answer instead
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -33,8 +34,8 @@ void* __libc_memalign(size_t, size_t);
 
 static atomic_long g_count;
 static long g_number, g_large, g_free = -1;
-static int g_error, g_reserves_nothing;
-static const char *g_kind = "", *g_mode = "", *g_folder = "";
+static int g_error;
+static const char *g_kind = "", *g_mode = "", *g_folder = "", *g_reserve = NULL;
 
 __attribute__((constructor)) static void begin(void) {
   const char* number = getenv("FAULT_NUMBER");
@@ -43,7 +44,7 @@ __attribute__((constructor)) static void begin(void) {
   g_large = large ? atol(large) : 1 << 20;
   if (getenv("FAULT_ERROR")) g_error = atoi(getenv("FAULT_ERROR"));
   if (getenv("FAULT_FREE")) g_free = atol(getenv("FAULT_FREE"));
-  g_reserves_nothing = getenv("FAULT_RESERVE") != NULL;
+  g_reserve = getenv("FAULT_RESERVE");
   if (getenv("FAULT_KIND")) g_kind = getenv("FAULT_KIND");
   if (getenv("FAULT_MODE")) g_mode = getenv("FAULT_MODE");
   if (getenv("FAULT_FOLDER")) g_folder = getenv("FAULT_FOLDER");
@@ -172,13 +173,15 @@ NAME_ANOTHER(link)
 TELL_SPACE(statvfs, statvfs)
 TELL_SPACE(statvfs64, statvfs64)
 
-#define RESERVE(name)                                              \
-  int name(int file, off_t offset, off_t bytes) {                  \
-    if (g_reserves_nothing) return ftruncate(file, offset + bytes); \
-    return NEXT(name)(file, offset, bytes);                        \
+// FAULT_RESERVE is "lies", or the number of what a file system answers that cannot reserve anything.
+#define RESERVE(name)                                                                \
+  int name(int file, int mode, off_t offset, off_t bytes) {                          \
+    if (!g_reserve || mode != 0) return NEXT(name)(file, mode, offset, bytes);       \
+    if (strcmp(g_reserve, "lies") == 0) return ftruncate(file, offset + bytes);      \
+    FAIL(atoi(g_reserve), -1);                                                       \
   }
-RESERVE(posix_fallocate)
-RESERVE(posix_fallocate64)
+RESERVE(fallocate)
+RESERVE(fallocate64)
 
 static int allocation_fails(size_t bytes) { return g_large > 0 && bytes > (size_t)g_large && must_fail("allocate"); }
 

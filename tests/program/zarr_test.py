@@ -90,6 +90,20 @@ def test_a_folder_of_something_else_stays(finished, name):
     assert os.listdir(folder + ".zarr") == [name] and not os.path.exists(folder + ".mrc")
 
 
+@pytest.mark.parametrize("version", ("0.4", "0.5"))
+def test_a_store_into_which_others_put_something_stays(finished, version):
+    """Viewers write labels into the store that they show."""
+    path = os.path.join(harness.SCRATCH, "labelled" + version)
+    command = ["export", finished.model_path, "-o", path + ".mrc", "--zarr", "--zarr-version", version,
+               "--overwrite"]
+    harness.succeed(*command)
+    harness.succeed(*command)
+    os.mkdir(path + ".zarr/labels")
+    refused = harness.tomofield(*command)
+    assert refused.returncode == 2 and "'labels'" in refused.stderr, refused.stderr
+    assert os.path.isdir(path + ".zarr/labels")
+
+
 # Debian's python3-zarr does not know the final version 3, so this reads it by the specification
 # (zarr-specs.readthedocs.io, core specification of version 3; ngff.openmicroscopy.org 0.5).
 

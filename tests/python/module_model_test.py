@@ -1,5 +1,9 @@
 """tomofield.Model gives points, boxes and tilted planes, as `tomofield export` does."""
 
+import _thread
+import threading
+import time
+
 import mrcfile
 import numpy as np
 import pytest
@@ -56,7 +60,42 @@ def test_bad_input_is_refused_in_a_sentence(series, model):
     for size in ((2**21, 2**21, 2**22), (2**62, 4, 4), (4, 1, 2**62)):
         with pytest.raises(tomofield.Error, match="too large"):
             model.sample(tomofield.Box((0, 0, 0), size))
+    large = tomofield.Box((0, 0, 0), (20000, 20000, 20000))
+    with pytest.raises(tomofield.Error, match="29802.3 GiB of memory"):
+        model.sample(large)
+    with pytest.raises(tomofield.Error, match="its disk has only"):
+        tomofield.export(model, series.folder / "large.mrc", box=large)
     with pytest.raises(tomofield.Error, match="N rows"):
         model.sample_points([1, 2, 3])
     with pytest.raises(tomofield.Error, match="finite"):
         model.sample_points([[1, 2, np.nan]])
+
+
+def test_ctrl_c_stops_a_long_sampling(model):
+    timer = threading.Timer(1, _thread.interrupt_main)
+    timer.start()
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        model.sample(tomofield.Box((16, 16, 8), (700, 700, 700), euler_deg=(10, 20, 30)))
+    assert time.monotonic() - begun < 20
+    timer.join()
+
+
+def test_threads_export_at_the_same_time(model, tmp_path):
+    """The results of one thread are not those of another."""
+    failures = []
+
+    def export(name):
+        try:
+            for _ in range(20):
+                tomofield.export(model, tmp_path / name, overwrite=True)
+        except BaseException as error:
+            failures.append(error)
+
+    threads = [threading.Thread(target=export, args=(f"{i}.mrc",)) for i in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not failures, failures
+    assert sorted(path.name for path in tmp_path.glob("*.mrc")) == [f"{i}.mrc" for i in range(4)]

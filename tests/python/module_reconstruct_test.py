@@ -239,14 +239,16 @@ def test_options_keep_what_they_are_set_to():
 @pytest.mark.parametrize("work", [
     "tomofield.reconstruct(views, tilts, epochs=1000, thickness=16, contrast='bright', "
     "pixel_size_A=10, density_variation=1.0, prior='tv')",
-    "[tomofield.score_volume(views, views) for _ in iter(int, 1)]"])
-def test_the_interpreter_ends_in_order_beside_a_daemon_thread(work):
+    "[tomofield.score_volume(views, views) for _ in iter(int, 1)]",
+    "model.sample(tomofield.Box((16, 16, 8), (700, 700, 700), euler_deg=(10, 20, 30)))"])
+def test_the_interpreter_ends_in_order_beside_a_daemon_thread(series, work):
     script = f"""
 import threading, time
 import numpy as np
 import tomofield
 views = np.random.default_rng(1).normal(100, 10, (21, 32, 32)).astype(np.float32)
 tilts = np.linspace(-60, 60, 21)
+model = tomofield.Model({str(series.folder / "tomogram.h5")!r})
 begun = threading.Event()
 def work():
     begun.set()

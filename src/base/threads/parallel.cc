@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/system/processors.h"
+#include "base/threads/thread_context.h"
 #include "base/threads/worker_threads.h"
 #include "base/trace.h"
 
@@ -144,7 +145,9 @@ void detail::run_loop(const char* what, std::int64_t count, void (*call)(void*, 
                       void* body) {
   if (count <= 0) return;
   TraceLoop loop(what, count);
+  void* const context = thread_context();
   const auto run_index = [&](std::int64_t i) {
+    const ContextScope scope(context);
     loop.run_task(i, thread_index(), [&] { call(body, i); });
   };
   WorkerThreads& workers = threads().workers();

@@ -92,10 +92,12 @@ std::size_t write_particles(const output::Model& model, ParticleList list,
   io::MrcSpec spec = stack_of(boxes.size, places.size(), model, boxes.voxel_px, options);
   double scale = options.invert ? -model.output_scale() : model.output_scale();
   if (options.voxel_type == VoxelType::kInt16) {
+    { const io::MrcWriter probe(stack, spec); }  // refuses before the pass, not after it
     scale *= output::int16_factor(scale * static_cast<double>(output::largest_density(model)),
                                   spec.labels.front());
   }
   io::MrcWriter file(stack, spec);
+  output::announce_sampling(model, places.front(), places.size());
   const output::BoxBounds region = output::region_bounds(model);
   std::size_t num_cut = 0;
   for (std::size_t p = 0; p < places.size(); ++p) {

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "base/check.h"
+#include "base/interruption.h"
 #include "base/system/memory.h"
 #include "base/threads/parallel.h"
 #include "field/sampling/aligned_rows.h"
@@ -17,6 +18,27 @@ namespace tomofield::field {
 namespace {
 
 constexpr std::int64_t kPartValues = std::int64_t{1} << 22;
+constexpr std::int64_t kBlock = 16;  // rows of a turned box
+
+// Returns the number of sections of an aligned box whose rows are sampled at once.
+std::int64_t sections_at_once(const OrientedBox& box, std::int64_t num_rows) {
+  return std::clamp(kPartValues / (num_rows * box.size[0]), std::int64_t{1}, box.size[2]);
+}
+
+// Throws Error if the parts that are sampled at once, with two copies of who writes them, are more
+// than the memory. Usual ones are small.
+void require_memory_of_parts(const OrientedBox& box, base::Range some) {
+  constexpr std::int64_t kCopies = 3, kUsual = 2 * kPartValues;
+  const std::int64_t rows = std::min<std::int64_t>(kBlock, some.size());
+  const std::int64_t values =
+      rows * box.size[0] * (box.is_aligned() ? sections_at_once(box, rows) : 1);
+  if (values <= kUsual) return;
+  const std::int64_t parts = (some.size() + rows - 1) / rows * (box.is_aligned() ? 1 : box.size[2]);
+  const std::int64_t at_once = std::min<std::int64_t>(base::thread_count(), parts);
+  base::require_memory(static_cast<std::size_t>(at_once * values * kCopies) * sizeof(float),
+                       fmt::format("sampling rows of {} voxels", box.size[0]).c_str(),
+                       "use fewer threads, or a box that is shorter along x");
+}
 
 // Samples a box along the axes: some rows of all sections, then the next rows.
 void sample_aligned(const Field& field, const OrientedBox& box, base::Range some,
@@ -24,7 +46,7 @@ void sample_aligned(const Field& field, const OrientedBox& box, base::Range some
   const AlignedRows rows(field, box);
   const auto [nx, ny, nz] = box.size;
   const std::int64_t block = rows.rows_at_once();
-  const std::int64_t part = std::clamp(kPartValues / (block * nx), std::int64_t{1}, nz);
+  const std::int64_t part = sections_at_once(box, block);
   TOMOFIELD_CHECK(some.begin % block == 0 && some.end <= ny, "rows in whole blocks");
   const std::int64_t num_blocks = (some.end - some.begin + block - 1) / block;
   base::parallel_for("sample box", num_blocks, [&, nx = nx, nz = nz](std::int64_t index) {
@@ -35,6 +57,7 @@ void sample_aligned(const Field& field, const OrientedBox& box, base::Range some
     for (std::int64_t first = 0; first < nz; first += part) {
       const std::int64_t count = std::min(part, nz - first);
       values.assign(static_cast<std::size_t>(count * num_rows * nx), 0.0f);
+      base::allow_interruption();
       rows.decode(leaves, first, count, num_rows, values.data());
       sink({first, count, first_row, num_rows, values});
     }
@@ -63,7 +86,6 @@ double voxel_density(const Field& field, const OrientedBox& box, std::int64_t x,
 
 void sample_rotated(const Field& field, const OrientedBox& box, base::Range some,
                     const BoxSink& sink) {
-  constexpr std::int64_t kBlock = 16;
   const auto [nx, ny, nz] = box.size;
   const std::int64_t blocks = (some.end - some.begin + kBlock - 1) / kBlock;
   base::parallel_for("sample rows", nz * blocks, [&, nx = nx](std::int64_t index) {
@@ -73,6 +95,7 @@ void sample_rotated(const Field& field, const OrientedBox& box, base::Range some
     std::vector<float> values;
     values.reserve(static_cast<std::size_t>(num_rows * nx));
     for (std::int64_t row = first_row; row < first_row + num_rows; ++row) {
+      base::allow_interruption();
       for (std::int64_t x = 0; x < nx; ++x)
         values.push_back(static_cast<float>(voxel_density(field, box, x, row, section)));
     }
@@ -117,15 +140,17 @@ OrientedBox box_between(const Point& low, const Point& high, double voxel_px) {
   return box;
 }
 
+double num_points(const OrientedBox& box) {
+  double points = std::pow(std::max(1.0, std::ceil(box.voxel_px - 1e-9)), 3);
+  for (const std::int64_t size : box.size) points *= static_cast<double>(size);
+  return points;
+}
+
 void require_feasible(const OrientedBox& box) {
   constexpr double kMostPoints = 1e13;  // hours to days of a machine
   constexpr double kMostSide = std::numeric_limits<std::int32_t>::max();
-  double points = std::pow(std::max(1.0, std::ceil(box.voxel_px - 1e-9)), 3);
-  double side = 0;
-  for (const std::int64_t size : box.size) {
-    points *= static_cast<double>(size);
-    side = std::max(side, static_cast<double>(size));
-  }
+  const double points = num_points(box);
+  const auto side = static_cast<double>(*std::ranges::max_element(box.size));
   if (points <= kMostPoints && side <= kMostSide) return;
   throw Error(fmt::format(
       "a box of {} × {} × {} voxels of {:g} px is too large: sampling it takes {:.2g} points, and "
@@ -146,6 +171,7 @@ void sample_box(const Field& field, const OrientedBox& box, base::Range rows, co
   TOMOFIELD_CHECK(box.size[0] > 0 && box.size[1] > 0 && box.size[2] > 0 && box.voxel_px > 0,
                   fmt::format("a box of {} × {} × {} voxels of {} px", box.size[0], box.size[1],
                               box.size[2], box.voxel_px));
+  require_memory_of_parts(box, rows);
   box.is_aligned() ? sample_aligned(field, box, rows, sink)
                    : sample_rotated(field, box, rows, sink);
 }
@@ -154,12 +180,17 @@ std::vector<float> sample_box(const Field& field, const OrientedBox& box) {
   return gather_box(box, [&](const BoxSink& sink) { sample_box(field, box, sink); });
 }
 
-std::vector<float> gather_box(const OrientedBox& box, const BoxSource& source) {
+void require_memory_of(const OrientedBox& box) {
   require_feasible(box);
   const auto [nx, ny, nz] = box.size;
   base::require_memory(static_cast<std::size_t>(nx * ny * nz) * sizeof(float),
                        fmt::format("a box of {} × {} × {} voxels", nx, ny, nz).c_str(),
                        "sample it in parts");
+}
+
+std::vector<float> gather_box(const OrientedBox& box, const BoxSource& source) {
+  require_memory_of(box);
+  const auto [nx, ny, nz] = box.size;
   std::vector<float> volume(static_cast<std::size_t>(nx * ny * nz));
   source([&, nx = nx, ny = ny](const BoxPart& part) {
     const auto rows = static_cast<std::ptrdiff_t>(part.num_rows * nx);

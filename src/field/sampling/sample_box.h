@@ -40,6 +40,9 @@ struct OrientedBox {
 /// fill it (at least one).
 OrientedBox box_between(const Point& low, const Point& high, double voxel_px);
 
+/// Returns the number of points in all voxels of a box.
+double num_points(const OrientedBox& box);
+
 /// Throws Error for a box that cannot be sampled in reasonable time: with more than 10¹³ points in
 /// all of its voxels, or a side of 2³¹ voxels or more. All arithmetic on the sizes of a box is safe
 /// after that.
@@ -62,7 +65,8 @@ struct BoxPart {
 using BoxSink = std::function<void(const BoxPart&)>;
 /// Computes the densities of a box. A voxel larger than a pixel is the mean of ceil(voxel_px)³
 /// regularly spaced points, so that coarse boxes do not alias; other voxels are single points. The
-/// density is 0 outside the domain. Throws Error as require_feasible() does.
+/// density is 0 outside the domain. Throws Error as require_feasible() does, and if memory is too
+/// small for the rows that are sampled at once.
 ///
 /// Boxes that are not rotated are evaluated 16 rows at a time, as in a fit. Rotated ones are
 /// evaluated point by point, which is tens of times slower. Memory: a few rows of the field's
@@ -72,13 +76,15 @@ void sample_box(const Field& field, const OrientedBox& box, const BoxSink& sink)
 /// a multiple of 16.
 void sample_box(const Field& field, const OrientedBox& box, base::Range rows, const BoxSink& sink);
 
-/// Returns the densities of a whole box, [z, y, x].
+/// Throws Error as require_feasible() does, or if memory is too small for all voxels of a box.
+void require_memory_of(const OrientedBox& box);
+/// Returns the densities of a whole box, [z, y, x]. Throws Error as require_memory_of() does.
 std::vector<float> sample_box(const Field& field, const OrientedBox& box);
 
 /// Passes every voxel of a box to a sink.
 using BoxSource = std::function<void(const BoxSink&)>;
 /// Returns the densities that a source passes of a box, [z, y, x]. Throws Error as
-/// require_feasible() does, or if memory is too small for the whole box.
+/// require_memory_of() does.
 std::vector<float> gather_box(const OrientedBox& box, const BoxSource& source);
 
 /// Returns the densities at points, 0 outside the domain.

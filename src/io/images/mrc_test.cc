@@ -4,7 +4,9 @@
 #include <sys/stat.h>
 
 #include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -251,8 +253,22 @@ TEST(Mrc, UnwritableDirectoryIsAnErrorBeforeAnyWork) {
   EXPECT_EQ(scratch.num_files(), 0u);
 }
 
+TEST(Mrc, FilesLargerThanTheDiskOrWhoseRowsAreMoreThanTheMemoryAreRefusedBeforeAnyWork) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](std::int64_t nx, std::int64_t ny, std::int64_t nz) {
+    return message_of<Error>([&] { MrcWriter(scratch / "a.mrc", spec_of(nx, ny, nz)); });
+  };
+  constexpr std::int64_t kMost = (std::int64_t{1} << 31) - 1;
+  EXPECT_NE(refusal(kMost, 1000, 1000).find("its disk has only"), std::string::npos);
+  for (const std::int64_t nz : {std::int64_t{1000000}, kMost})
+    EXPECT_NE(refusal(1, kMost, nz).find("GiB of memory"), std::string::npos) << nz;
+  EXPECT_FALSE(std::filesystem::exists(scratch / "a.mrc"));
+}
+
 TEST(Mrc, FilesBeyondFourGibibytesWork) {
   const ScratchDirectory scratch;
+  if (std::filesystem::space(scratch.path()).available < std::uintmax_t{6} << 30)
+    GTEST_SKIP() << "the disk is too small";
   const auto path = scratch / "large.mrc";
   std::vector<float> row(16384);
   for (std::size_t i = 0; i < row.size(); ++i) row[i] = static_cast<float>(i);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <mutex>
 #include <optional>
@@ -10,6 +11,8 @@
 
 #include "base/check.h"
 #include "base/log.h"
+#include "base/plausible.h"
+#include "base/system/memory.h"
 #include "io/images/mrc.h"
 #include "io/images/mrc_format.h"
 #include "io/saving/atomic_file.h"
@@ -57,13 +60,37 @@ MrcHeader header_of(const MrcSpec& spec, const std::string& name) {
   return header;
 }
 
-void warn_if_disk_is_small(const std::filesystem::path& path, std::int64_t bytes) {
+constexpr double kGibibyte = 1 << 30;
+
+// Throws Error if the disk has less room than a file needs. Some disks that have room say that they
+// have none at all, and are written with a warning.
+void require_room(const std::filesystem::path& folder, const std::filesystem::path& path,
+                  std::int64_t bytes) {
   std::error_code error;
-  const auto space = std::filesystem::space(path, error);
-  if (!error && space.available < static_cast<std::uintmax_t>(bytes)) {
-    base::log_warning(fmt::format("'{}' will have {} bytes, but its disk has only {} left",
-                                  path.string(), bytes, space.available));
+  const auto space = std::filesystem::space(folder, error);
+  if (error || space.available >= static_cast<std::uintmax_t>(bytes)) return;
+  if (space.available == 0) {
+    return base::log_warning(
+        fmt::format("'{}' will have {} bytes, but its disk has only 0 left", path.string(), bytes));
   }
+  throw Error(fmt::format(
+      "cannot write '{}': it will have {} bytes ({:.4g} GiB), and its disk has only {:.4g} GiB "
+      "left: free some space there, write to another folder, or make a smaller volume",
+      path.string(), bytes, static_cast<double>(bytes) / kGibibyte,
+      static_cast<double>(space.available) / kGibibyte));
+}
+
+// Returns room for the moments of all rows. Throws Error if it is more than the memory.
+std::vector<RowMoments> moments_of_rows(const MrcHeader& header, const std::string& name) {
+  constexpr std::size_t kSmall = std::size_t{1} << 24;
+  const std::size_t rows =
+      static_cast<std::size_t>(header.ny) * static_cast<std::size_t>(header.nz);
+  const auto bytes = (base::CheckedSize(rows) * sizeof(RowMoments)).find();
+  const std::size_t needed = bytes ? static_cast<std::size_t>(*bytes) : SIZE_MAX;
+  if (needed > kSmall)
+    base::require_memory(needed, fmt::format("writing '{}'", name).c_str(),
+                         "make a smaller volume, or write it in parts");
+  return std::vector<RowMoments>(rows);
 }
 
 }  // namespace
@@ -83,14 +110,14 @@ struct MrcWriter::Impl {
   Impl(const std::filesystem::path& path, const MrcSpec& spec, const distributed::Communicator& all)
       : header(header_of(spec, path.string())),
         processes(all),
-        rows(static_cast<std::size_t>(spec.ny * spec.nz)) {
+        rows(moments_of_rows(header, path.string())) {
     std::filesystem::path temporary;
     processes.run_collectively([&] {
       if (!processes.is_root()) return;
       target.emplace(path);
       temporary = target->temporary_path();
       const std::int64_t bytes = expected_file_bytes(header, path.string());
-      warn_if_disk_is_small(temporary, bytes);
+      require_room(temporary, path, bytes);
       file.emplace(temporary, PositionedFile::Access::kReadWrite);
       file->resize(bytes);
     });

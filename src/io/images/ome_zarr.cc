@@ -1,14 +1,18 @@
 #include "io/images/ome_zarr.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
+#include <system_error>
 #include <vector>
 
 #include "io/images/mrc.h"
 #include "io/images/zarr_array.h"
 #include "io/saving/atomic_folder.h"
 #include "io/saving/positioned_file.h"
+#include "tomofield/error.h"
 #include "tomofield/version.h"
 
 namespace tomofield::io {
@@ -136,10 +140,30 @@ void write_group(const std::filesystem::path& root, nlohmann::json scales, ZarrV
   write_text(root / ".zgroup", {{"zarr_format", 2}});
 }
 
+// Says whether write_ome_zarr() gives this name to a file or a folder of a store.
+bool is_own_name(const std::string& name) {
+  constexpr std::array<const char*, 4> kFiles{kZarrMarker, ".zattrs", ".zgroup", "zarr.json"};
+  return std::ranges::find(kFiles, name) != kFiles.end() ||
+         std::ranges::all_of(name, [](char c) { return c >= '0' && c <= '9'; });
+}
+
 }  // namespace
+
+void require_replaceable_zarr(const std::filesystem::path& path) {
+  require_replaceable_folder(path, kZarrMarker);
+  std::error_code absent;
+  for (const auto& entry : std::filesystem::directory_iterator(path, absent)) {
+    if (is_own_name(entry.path().filename().string())) continue;
+    throw Error(
+        fmt::format("cannot replace '{}': it has '{}', which tomofield has not made; move one of "
+                    "them away, or give another name",
+                    path.string(), entry.path().filename().string()));
+  }
+}
 
 void write_ome_zarr(const std::filesystem::path& mrc, const std::filesystem::path& zarr,
                     const std::string& name, ZarrVersion version) {
+  require_replaceable_zarr(zarr);
   const MrcReader volume(mrc);
   const MrcHeader& header = volume.header();
   AtomicFolder folder(zarr, kZarrMarker);

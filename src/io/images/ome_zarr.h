@@ -11,13 +11,18 @@ namespace tomofield::io {
 /// replaced.
 inline constexpr const char* kZarrMarker = ".tomofield";
 
+/// Throws Error if something is at `path` that write_ome_zarr() must not replace: anything but a
+/// store that this program made, or such a store with something that others put into it, such as
+/// labels.
+void require_replaceable_zarr(const std::filesystem::path& path);
+
 /// Writes an MRC volume as OME-Zarr (https://ngff.openmicroscopy.org/): axes z, y, x in Å, the
 /// volume itself in the array "0", and in "1", "2", … the means of 2 × 2 × 2 voxels of the array
 /// before, until one chunk holds all. Chunks are uncompressed and have 64 voxels a side. ORIGIN
 /// becomes a translation. Voxels stay float32, float16 or int16.
 ///
 /// Holds 64 rows of 64 sections at once, however large the volume is. The folder appears as a whole
-/// (AtomicFolder). Throws Error if it cannot be written.
+/// (AtomicFolder). Throws Error if it cannot be written, and as require_replaceable_zarr() does.
 void write_ome_zarr(const std::filesystem::path& mrc, const std::filesystem::path& zarr,
                     const std::string& name, ZarrVersion version);
 

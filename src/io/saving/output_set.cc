@@ -5,7 +5,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -14,14 +13,13 @@
 
 #include "base/check.h"
 #include "base/log.h"
+#include "base/threads/thread_context.h"
 #include "io/saving/output_target.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
 namespace fs = std::filesystem;
 namespace {
-
-std::atomic<OutputSet*> g_active{nullptr};
 
 [[noreturn]] void throw_cannot_replace(const fs::path& target) {
   const int error = errno;
@@ -116,17 +114,16 @@ struct OutputSet::Change {
   }
 };
 
-OutputSet::OutputSet() {
-  OutputSet* none = nullptr;
-  is_active_ = g_active.compare_exchange_strong(none, this);
-  TOMOFIELD_CHECK(is_active_, "there is another set of results already");
+OutputSet::OutputSet() : is_active_(true) {
+  TOMOFIELD_CHECK(active() == nullptr, "there is another set of results already");
+  base::thread_context() = this;
 }
 
 OutputSet::~OutputSet() {
-  if (is_active_) g_active = nullptr;
+  if (is_active_) base::thread_context() = nullptr;
 }
 
-OutputSet* OutputSet::active() { return g_active; }
+OutputSet* OutputSet::active() { return static_cast<OutputSet*>(base::thread_context()); }
 
 void OutputSet::add(AtomicFile file) {
   const std::lock_guard guard(mutex_);

@@ -12,12 +12,13 @@ namespace tomofield::io {
 /// Collects the results of a command, which appear together or not at all.
 ///
 ///   OutputSet results;
-///   …write files by AtomicFile, in any thread…
+///   …write files by AtomicFile, in this thread and those of its parallel_for…
 ///   results.commit();
 ///
-/// From its construction on, every AtomicFile::commit() of the process adds its file to the set,
-/// and the files get their names in commit(). One set at a time exists. Without commit() all files
-/// are removed, and what they would replace stays.
+/// From its construction on, every AtomicFile::commit() of its thread, and of those that help it in
+/// a parallel_for, adds its file to the set, and the files get their names in commit(). A thread
+/// has one set at a time; those of other threads have nothing to do with it. Without commit() all
+/// files are removed, and what they would replace stays.
 class OutputSet {
  public:
   OutputSet();
@@ -29,7 +30,7 @@ class OutputSet {
   OutputSet(const OutputSet&) = delete;
   OutputSet& operator=(const OutputSet&) = delete;
 
-  /// Returns the set that files join now, or null.
+  /// Returns the set that files of this thread join now, or null.
   static OutputSet* active();
 
   /// Adds a file that is flushed.

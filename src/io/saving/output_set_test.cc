@@ -7,7 +7,10 @@
 #include <unistd.h>
 
 #include <functional>
+#include <string>
+#include <thread>
 
+#include "base/threads/parallel.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 
@@ -84,6 +87,26 @@ TEST_F(OutputSetTest, RemovesOldFilesWithItsCommit) {
   results.commit();
   EXPECT_FALSE(fs::exists(old_));
   EXPECT_EQ(scratch_.num_files(), 1u);
+}
+
+TEST_F(OutputSetTest, OfAnotherThreadHasFilesOfItsOwn) {
+  OutputSet results;
+  std::thread other([&] {
+    OutputSet others;
+    write_text_file(scratch_ / "other", "new");
+    EXPECT_FALSE(fs::exists(scratch_ / "other"));
+    others.commit();
+    EXPECT_TRUE(fs::exists(scratch_ / "other"));
+    EXPECT_EQ(OutputSet::active(), &others);
+  });
+  other.join();
+  base::parallel_for("write", 8, [&](std::int64_t i) {
+    EXPECT_EQ(OutputSet::active(), &results);
+    write_text_file(scratch_ / ("part" + std::to_string(i)), "new");
+  });
+  EXPECT_FALSE(fs::exists(scratch_ / "part7"));
+  results.commit();
+  EXPECT_TRUE(fs::exists(scratch_ / "part7"));
 }
 
 TEST_F(OutputSetTest, KeepsOneFileOfMany) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <span>
 #include <string_view>
 
 namespace tomofield::io {
@@ -10,13 +11,14 @@ namespace tomofield::io {
 /// which has room, or that of the system if no file is written.
 std::filesystem::path scratch_directory(const std::filesystem::path& output);
 
-/// Returns a line that says why SIGBUS came, if it came because the last scratch file lost its
-/// place on the disk: some file systems reserve room that they do not have. Returns an empty text
-/// if there has been no scratch file. A handler of signals may call it.
+/// Returns a line that says why SIGBUS came, if it came because the disk of the last scratch file
+/// could not be read. Returns an empty text if there has been no scratch file. A handler of signals
+/// may call it.
 std::string_view scratch_fault();
 
 /// Zeroed bytes for what is needed during one run. A small array lies in memory, a large one in an
-/// unlinked file that the kernel pages, so that it may be larger than the memory.
+/// unlinked file that the kernel pages, so that it may be larger than the memory. All is written by
+/// write(), which tells of a full disk: a store into a mapped page would end the process there.
 class ScratchMemory {
  public:
   /// Up to here an array is kept in memory: a 1K series of 60 views takes 250 MB.
@@ -33,8 +35,12 @@ class ScratchMemory {
   /// Returns the size of the file that holds `bytes` bytes: 0 if they are kept in memory.
   static std::size_t bytes_in_file(std::size_t bytes) { return bytes > kInMemoryBytes ? bytes : 0; }
 
-  std::byte* data() const { return data_; }
+  const std::byte* data() const { return data_; }
   std::size_t size() const { return size_; }
+
+  /// Throws Error if the file cannot be written, as where a file system has promised room that it
+  /// does not have. Threads may write different bytes at once.
+  void write(std::size_t first, std::span<const std::byte> values);
 
   /// Removes a part that lies in a file from this process's memory; it keeps its values and comes
   /// back when it is used. Only whole pages are removed.
@@ -44,10 +50,16 @@ class ScratchMemory {
   void discard(std::size_t first, std::size_t count) const;
 
  private:
-  void advise(std::size_t first, std::size_t count, int advice) const;
+  struct Pages {
+    std::size_t begin, size;  // in bytes
+  };
+  Pages pages_within(std::size_t first, std::size_t count) const;
+  void make_file(const char* noun);
+  int reserve() const;  // returns 0, or the code of what went wrong
 
-  std::size_t size_ = 0;
-  bool is_in_file_ = false;
+  std::size_t size_;
+  std::filesystem::path directory_;
+  int file_ = -1;  // or none
   std::byte* data_ = nullptr;
 };
 

@@ -1,10 +1,12 @@
 #include "io/saving/scratch_memory.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
-#include <cstring>
+#include <csignal>
+#include <cstddef>
 #include <filesystem>
-#include <utility>
+#include <vector>
 
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -14,9 +16,13 @@ namespace {
 
 constexpr std::size_t kPage = 4096, kBytes = 10 * kPage + 17;
 
-void expect_keeps_values(const ScratchMemory& memory) {
+void fill(ScratchMemory& memory, std::byte value) {
+  memory.write(0, std::vector<std::byte>(kBytes, value));
+}
+
+void expect_keeps_values(ScratchMemory memory) {
   for (std::size_t i = 0; i < kBytes; ++i) ASSERT_EQ(memory.data()[i], std::byte{0}) << i;
-  std::memset(memory.data(), 7, kBytes);
+  fill(memory, std::byte{7});
   memory.release(0, kBytes);
   for (std::size_t i = 0; i < kBytes; ++i) ASSERT_EQ(memory.data()[i], std::byte{7}) << i;
   memory.discard(kPage, 2 * kPage);
@@ -34,8 +40,8 @@ TEST(ScratchMemory, KeepsWhatIsReleasedAndNotDiscarded) {
 }
 
 TEST(ScratchMemory, DiscardedMemoryIsReturned) {
-  const ScratchMemory memory(kBytes, "the bytes", "/tmp");
-  std::memset(memory.data(), 7, kBytes);
+  ScratchMemory memory(kBytes, "the bytes", "/tmp");
+  fill(memory, std::byte{7});
   memory.discard(kPage + 1, 3 * kPage);
   EXPECT_EQ(memory.data()[kPage + 1], std::byte{7}) << "the page has another part";
   for (std::size_t i = 2 * kPage; i < 4 * kPage; ++i) ASSERT_EQ(memory.data()[i], std::byte{0});
@@ -48,6 +54,36 @@ TEST(ScratchMemory, LeavesNoFile) {
     EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
   }
   EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
+}
+
+// Lets files of this process be no larger than some bytes for as long as it lives.
+class LimitOfFiles {
+ public:
+  explicit LimitOfFiles(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &old_);
+    const rlimit limit{bytes, old_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~LimitOfFiles() {
+    setrlimit(RLIMIT_FSIZE, &old_);
+    std::signal(SIGXFSZ, old_handler_);
+  }
+  LimitOfFiles(const LimitOfFiles&) = delete;
+  LimitOfFiles& operator=(const LimitOfFiles&) = delete;
+
+ private:
+  rlimit old_{};
+  void (*old_handler_)(int);
+};
+
+TEST(ScratchMemory, AFileThatCannotBeWrittenAfterAllThrowsAndEndsNoProcess) {
+  const testing::ScratchDirectory scratch;
+  ScratchMemory memory(kBytes, "the bytes", scratch.path(), /*in_memory_bytes=*/0);
+  const LimitOfFiles limit(kPage);
+  const std::string message = testing::message_of<Error>([&] { fill(memory, std::byte{7}); });
+  EXPECT_NE(message.find(scratch.path().string()), std::string::npos) << message;
+  EXPECT_NE(message.find("less room than it said"), std::string::npos) << message;
+  EXPECT_EQ(memory.data()[kPage - 1], std::byte{7}) << "what was written can be read";
 }
 
 TEST(ScratchMemory, AFolderThatIsNotThereIsNamed) {
