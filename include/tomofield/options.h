@@ -145,7 +145,6 @@ struct FitOptions {
   int subsets = 16;    ///< interleaved subsets of views: steps a pass
   Engine engine = Engine::kSlab;
   int ray_samples = 0;  ///< ray engine: along a leaf's diagonal (N_max of eq. 10); 0: one a pixel
-  std::int64_t rays_per_step = 0;  ///< ray engine: about; 0: all rays over `subsets`
   Choice<double> learning_rate = Choice<double>::usual(0.05);      ///< of the first step
   Choice<double> density_variation = Choice<double>::usual(14.0);  ///< weight of total variation
   double factor_variation = 0.0;  ///< weight of the factors' total variation

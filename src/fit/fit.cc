@@ -71,12 +71,6 @@ std::vector<Stage> first_stages(std::vector<Stage> stages, int num_stages) {
   return stages;
 }
 
-int steps_per_epoch_of(const measurement::Measurement& measurement, const FitOptions& options) {
-  return measurement.ray_geometry
-             ? objective::ray_steps_per_epoch(options, measurement.rays->shape())
-             : options.subsets;
-}
-
 // Returns the leaves that a process keeps; an empty list means all.
 std::vector<int> leaves_to_keep(const distributed::Communicator& processes,
                                 const field::Quadtree& tree, const measurement::RowShare& share,
@@ -130,7 +124,7 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
       may_change_tree_(field_options.tree != TreeKind::kUniform),
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())),
       fitted_views_(measurement.fitted_views()),
-      steps_per_epoch_(steps_per_epoch_of(measurement, options_)) {
+      steps_per_epoch_(options.subsets) {
   if (options_.coarse_epochs > 0 && stages_.front().bin == 1 && options_.engine == Engine::kSlab)
     base::log_info(
         "no coarse stage: leaves of this --leaf-size do not end with slabs of coarse pixels");

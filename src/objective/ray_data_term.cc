@@ -39,14 +39,6 @@ std::uint32_t draw_of(std::uint64_t seed, std::uint64_t stream) {
 
 }  // namespace
 
-int ray_steps_per_epoch(const FitOptions& options, const measurement::SlabViews::Shape& shape) {
-  if (options.rays_per_step == 0) return options.subsets;
-  const std::int64_t rays =
-      static_cast<std::int64_t>(shape.num_views) * shape.width * shape.num_rows;
-  const std::int64_t steps = (rays + options.rays_per_step - 1) / options.rays_per_step;
-  return static_cast<int>(std::min<std::int64_t>(steps, std::numeric_limits<int>::max()));
-}
-
 RayDataTerm::RayDataTerm(const geometry::RayGeometry& geometry,
                          const measurement::SlabViews& measured, const field::Field& field,
                          const RayRegion& region, const FitOptions& options)
@@ -56,7 +48,7 @@ RayDataTerm::RayDataTerm(const geometry::RayGeometry& geometry,
       thickness_(field.thickness()),
       roots_(field.tree().roots()),
       seed_(options.seed),
-      steps_per_epoch_(ray_steps_per_epoch(options, measured.shape())),
+      steps_per_epoch_(options.subsets),
       projector_(geometry, field, region.support,
                  samples_per_diagonal(options, field.tree(), field.thickness())) {
   for (int view = 0; view < geometry.num_views(); ++view) bundles_.push_back(geometry.rays(view));
@@ -78,7 +70,7 @@ std::size_t RayDataTerm::working_memory(const geometry::RayGeometry& geometry,
   }
   const double num_rays = static_cast<double>(shape.num_views) *
                           static_cast<double>(shape.width * shape.num_rows) /
-                          ray_steps_per_epoch(options, shape);
+                          options.subsets;
   const double at_once = std::min(num_rays, static_cast<double>(kRaysAtOnce));
   return static_cast<std::size_t>(num_rays * kBytesPerRay + at_once * bytes_of_ray);
 }

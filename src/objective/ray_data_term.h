@@ -21,10 +21,8 @@ struct RayRegion {
   geometry::Extent2 support;
 };
 
-/// Returns the number of steps in which the ray engine sees every ray of a series once.
-int ray_steps_per_epoch(const FitOptions& options, const measurement::SlabViews::Shape& shape);
-
-/// Computes the data term of eq. 9 on random batches of rays. Let an epoch have n steps. Each view
+/// Computes the data term of eq. 9 on random batches of rays. Let an epoch have n steps
+/// (FitOptions::subsets). Each view
 /// is divided into runs of n pixels, and every step takes another random pixel of each run. So an
 /// epoch uses each ray once, and every step has rays of all views and places. Rays that miss the
 /// region of interest or are masked do not count.

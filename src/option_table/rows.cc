@@ -338,10 +338,6 @@ constexpr Row kRows[] = {
     {.key = "fit.ray_samples", .flag = "--ray-samples", MEMBER(options.fit, ray_samples),
      .group = Group::kResearch, .range = Range::between(0, 1 << 20),
      .help = "Samples along a leaf's diagonal (with --engine ray). 0: one for each pixel"},
-    {.key = "fit.rays_per_step", .flag = "--rays-per-step", MEMBER(options.fit, rays_per_step),
-     .group = Group::kResearch, .range = Range::between(0, kMaxCount),
-     .help = "Approximate number of rays in a step (with --engine ray). 0: all rays divided by "
-             "--subsets"},
     {.key = "fit.learning_rate", .flag = "--learning-rate", MEMBER(options.fit, learning_rate),
      .group = Group::kResearch, .range = Range::above(0), .automatic = "0.05; 0.035 for --field grid",
      .help = "Learning rate of the first step; it decays exponentially. Vertices that are "

@@ -37,9 +37,9 @@ void note_members(const Struct& of, const Note& note) {
     note_all(m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10);
   } else if constexpr (std::is_same_v<Struct, FitOptions>) {
     const auto& [m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17,
-                 m18, m19, m20, m21, m22, m23, m24, m25, m26] = of;
+                 m18, m19, m20, m21, m22, m23, m24, m25] = of;
     note_all(m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17, m18,
-             m19, m20, m21, m22, m23, m24, m25, m26);
+             m19, m20, m21, m22, m23, m24, m25);
   } else if constexpr (std::is_same_v<Struct, VolumeOptions>) {
     const auto& [m0, m1, m2, m3, m4] = of;
     note_all(m0, m1, m2, m3, m4);

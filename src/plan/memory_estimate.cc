@@ -137,7 +137,7 @@ int num_fitted_views(const measurement::Measurement& plan, const FitOptions& opt
 }
 
 int steps_an_epoch(const measurement::Measurement& plan, const FitOptions& options) {
-  if (plan.ray_geometry) return objective::ray_steps_per_epoch(options, plan.rays_shape());
+  if (plan.ray_geometry) return options.subsets;
   return std::min(options.subsets, num_fitted_views(plan, options));
 }
 

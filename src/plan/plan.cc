@@ -70,9 +70,8 @@ std::size_t memory_of_trials(const measurement::Measurement& plan,
                              const distributed::Communicator& processes) {
   constexpr int kMostSideBySide = 4;  // tune/automatic_choice.cc
   constexpr int kCopies = 5;  // parameters, gradient, two moments, and a change of the stage
-  constexpr std::int64_t kRowsBeyond = 16;  // tune::short_trial()
-  const tune::TrialShape trial = options.fit.tune ? tune::trial_of_tune(options.field, options.fit)
-                                                  : tune::short_trial(options.field, options.fit);
+  constexpr std::int64_t kRowsBeyond = 16;  // tune::search_trial()
+  const tune::TrialShape trial = tune::search_trial(options.field, options.fit);
   Rectangle rows = plan.roi;
   rows.y1 = std::min(rows.y1, rows.y0 + trial.rows + kRowsBeyond);
   const fit::Domain domain = fit::make_domain(plan.geometry, rows, trial.field);

@@ -150,13 +150,11 @@ Work work_of(const measurement::Measurement& plan, const options::ReconstructOpt
   if (options.run.align != Alignment::kOff) add_alignment(plan, options, run, work);
   if (run.num_trials == 0) return work;
   const tune::TrialShape trial =
-      options.fit.tune
-          ? tune::trial_of_tune(options.field, options.fit)
-          : tune::short_trial(options.field, options.fit, measurement::largest_reach_px(plan));
+      tune::search_trial(options.field, options.fit, measurement::largest_reach_px(plan));
   work.add_fit(plan, trial.field, trial.fit, run.steps_an_epoch, static_cast<double>(trial.rows),
                run.num_trials);
   if (options.open_settings().prior) {
-    const tune::TrialShape whole = tune::prior_trial(options.field, options.fit);
+    const tune::TrialShape whole = tune::whole_trial(options.field, options.fit);
     work.add_fit(plan, whole.field, whole.fit, run.steps_an_epoch, static_cast<double>(whole.rows),
                  tune::kPriorTrials);
   }

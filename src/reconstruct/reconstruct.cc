@@ -63,15 +63,15 @@ std::optional<tune::TunedFit> choose_by_trials(const Run& run, const tune::OpenS
   const options::ReconstructOptions& options = run.options;
   const tune::TuneHooks hooks{.progress = run.observer.trials,
                               .stop_requested = run.observer.stop_requested};
-  if (!options.fit.tune)
-    return tune::choose_by_short_trials(run.measurement, options.field, options.fit, open, hooks,
-                                        run.processes);
-  const std::string fingerprint =
-      checkpoint::fingerprint_of(options, run.measurement, run.processes);
-  const std::filesystem::path path = run.writes_files() ? run.paths.trials : "";
-  std::optional<tune::TrialFile> file;
-  run.processes.run_collectively([&] { file.emplace(path, fingerprint, options.run.resume); });
-  return tune::tune(run.measurement, options.field, options.fit, open, *file, hooks, run.processes);
+  std::optional<tune::TrialFile> file;  // short trials are not worth one
+  if (options.fit.tune) {
+    const std::string fingerprint =
+        checkpoint::fingerprint_of(options, run.measurement, run.processes);
+    const std::filesystem::path path = run.writes_files() ? run.paths.trials : "";
+    run.processes.run_collectively([&] { file.emplace(path, fingerprint, options.run.resume); });
+  }
+  return tune::choose_settings(run.measurement, options.field, options.fit, open,
+                               file ? &*file : nullptr, hooks, run.processes);
 }
 
 // Takes over what was chosen, and corrects the views as it says.

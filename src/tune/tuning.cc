@@ -75,7 +75,7 @@ std::optional<TunedFit> with_prior(std::optional<TunedFit> tuned,
                                    const TuneHooks& hooks,
                                    const distributed::Communicator& processes) {
   if (!tuned || !open.prior) return tuned;
-  const TrialShape shape = prior_trial(field, fit);
+  const TrialShape shape = whole_trial(field, fit);
   TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
                  open.view_scale || fit.fit_view_scale, hooks, kPriorTrials, processes);
   const std::optional<TunedFit> compared = searched(
@@ -108,25 +108,59 @@ void log_trials(const TunedFit& tuned, FieldKind kind) {
       "pairs of patches); a patch that all predict badly moves the mean error, but not this");
 }
 
+TrialShape short_trial(const FieldOptions& field, const FitOptions& fit, std::int64_t reach_px) {
+  FieldOptions plain = field;
+  plain.kind = FieldKind::kGrid;
+  return {kShortRows + 2 * std::min(reach_px, kMostRowsBeside), plain,
+          short_trial_options(plain, field, fit)};
+}
+
+// How a search looks for the weight of total variation and what it chooses with that.
+struct Search {
+  int num_trials = 0;
+  double first_variation = 0;
+  std::function<TrialSettings(const TrialSettings& start, FitTrials& trials)> choose_variation;
+};
+
+Search thorough_search(const FieldOptions& field, const FitOptions& fit, const OpenSettings& open) {
+  const SearchSpace space{.penalty = open.variation, .rank = field.kind == FieldKind::kVm};
+  // A run without total variation still needs a weight to search from.
+  const double first =
+      fit.density_variation > 0 ? *fit.density_variation : objective::usual_variation(fit.penalty);
+  return {expected_trials(space), first, [space](const TrialSettings& start, FitTrials& trials) {
+            return search_settings(start, space, trials);
+          }};
+}
+
+Search short_search(const FitOptions& fit, const OpenSettings& open) {
+  const bool is_open = open.variation;
+  return {usual_trials(open), *fit.density_variation,
+          [is_open](const TrialSettings& start, FitTrials& trials) {
+            return is_open ? choose_variation(start, trials) : start;
+          }};
+}
+
+void log_choice(const TrialSettings& chosen, const FitOptions& fit) {
+  if (!fit.tune) return base::log_info("chose " + describe(chosen, TrialSettings{}));
+  base::log_info(fmt::format(
+      "tuned: --tv-penalty {} --tv {:.3f} --rank {} --epochs {} "
+      "--vertex-epochs {} --coarse-epochs {}",
+      base::name_of(chosen.penalty), chosen.variation, chosen.rank, chosen.epochs,
+      fit.vertex_epochs, fit.coarse_epochs));
+}
+
 }  // namespace
 
 int expected_trials(const SearchSpace& space) {
   return kUsualWeights + 2 + (space.penalty ? 1 : 0) + (space.rank ? 2 : 0);
 }
 
-TrialShape trial_of_tune(const FieldOptions& field, const FitOptions& fit) {
-  return {kTrialRows, field, fit};
+TrialShape search_trial(const FieldOptions& field, const FitOptions& fit, std::int64_t reach_px) {
+  return fit.tune ? whole_trial(field, fit) : short_trial(field, fit, reach_px);
 }
 
-TrialShape prior_trial(const FieldOptions& field, const FitOptions& fit) {
+TrialShape whole_trial(const FieldOptions& field, const FitOptions& fit) {
   return {kTrialRows, field, fit};
-}
-
-TrialShape short_trial(const FieldOptions& field, const FitOptions& fit, std::int64_t reach_px) {
-  FieldOptions plain = field;
-  plain.kind = FieldKind::kGrid;
-  return {kShortRows + 2 * std::min(reach_px, kMostRowsBeside), plain,
-          short_trial_options(plain, field, fit)};
 }
 
 OpenSettings open_settings(OpenSettings wanted, const measurement::Measurement& measurement) {
@@ -157,62 +191,33 @@ TrialSettings search_settings(const TrialSettings& start, const SearchSpace& spa
   return trials.first_as_good(candidates);
 }
 
-std::optional<TunedFit> tune(const measurement::Measurement& measurement, const FieldOptions& field,
-                             const FitOptions& fit, const OpenSettings& open, TrialFile& file,
-                             const TuneHooks& hooks, const distributed::Communicator& processes) {
-  const SearchSpace space{.penalty = open.variation, .rank = field.kind == FieldKind::kVm};
-  const TrialShape shape = trial_of_tune(field, fit);
+std::optional<TunedFit> choose_settings(const measurement::Measurement& measurement,
+                                        const FieldOptions& field, const FitOptions& fit,
+                                        const OpenSettings& open, TrialFile* file,
+                                        const TuneHooks& hooks,
+                                        const distributed::Communicator& processes) {
+  const Search search = fit.tune ? thorough_search(field, fit, open) : short_search(fit, open);
+  const TrialShape shape =
+      search_trial(field, fit, measurement::largest_reach_px(measurement));
   TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
-                 open.view_scale || fit.fit_view_scale, hooks, expected_trials(space), processes);
-  // A run without total variation still needs a weight to search from.
-  const double first =
-      fit.density_variation > 0 ? *fit.density_variation : objective::usual_variation(fit.penalty);
+                 open.view_scale || fit.fit_view_scale, hooks, search.num_trials, processes);
   const TrialSettings start = with_safe_corrections({.penalty = fit.penalty,
-                                                     .variation = first,
-                                                     .rank = field.rank,
-                                                     .epochs = fit.epochs,
-                                                     .fits_view_scale = fit.fit_view_scale,
-                                                     .spike_rank = fit.spike_rank},
-                                                    open);
-  const std::optional<TunedFit> tuned = searched(fits, &file, [&](FitTrials& trials) {
-    TrialSettings best = search_settings(start, space, trials);
-    if (open.spikes) best = choose_spike_rank(best, trials);
-    return choose_corrections(best, open, trials);
-  });
-  if (!tuned) return std::nullopt;
-  log_trials(*tuned, field.kind);
-  base::log_info(fmt::format(
-      "tuned: --tv-penalty {} --tv {:.3f} --rank {} --epochs {} "
-      "--vertex-epochs {} --coarse-epochs {}",
-      base::name_of(tuned->settings.penalty), tuned->settings.variation, tuned->settings.rank,
-      tuned->settings.epochs, fit.vertex_epochs, fit.coarse_epochs));
-  return with_prior(tuned, measurement, field, fit, open, &file, hooks, processes);
-}
-
-std::optional<TunedFit> choose_by_short_trials(const measurement::Measurement& measurement,
-                                               const FieldOptions& field, const FitOptions& fit,
-                                               const OpenSettings& open, const TuneHooks& hooks,
-                                               const distributed::Communicator& processes) {
-  const TrialShape shape = short_trial(field, fit, measurement::largest_reach_px(measurement));
-  TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
-                 open.view_scale || fit.fit_view_scale, hooks, usual_trials(open), processes);
-  const TrialSettings start = with_safe_corrections({.penalty = fit.penalty,
-                                                     .variation = fit.density_variation,
+                                                     .variation = search.first_variation,
                                                      .rank = field.rank,
                                                      .epochs = shape.fit.epochs,
                                                      .fits_view_scale = fit.fit_view_scale,
                                                      .spike_rank = fit.spike_rank},
                                                     open);
-  std::optional<TunedFit> tuned = searched(fits, nullptr, [&](FitTrials& trials) {
-    TrialSettings best = open.variation ? choose_variation(start, trials) : start;
+  std::optional<TunedFit> tuned = searched(fits, file, [&](FitTrials& trials) {
+    TrialSettings best = search.choose_variation(start, trials);
     if (open.spikes) best = choose_spike_rank(best, trials);
     return choose_corrections(best, open, trials);
   });
   if (!tuned) return std::nullopt;
   log_trials(*tuned, field.kind);
-  base::log_info("chose " + describe(tuned->settings, TrialSettings{}));
-  tuned->settings.epochs = fit.epochs;
-  return with_prior(std::move(tuned), measurement, field, fit, open, nullptr, hooks, processes);
+  log_choice(tuned->settings, fit);
+  if (!fit.tune) tuned->settings.epochs = fit.epochs;
+  return with_prior(std::move(tuned), measurement, field, fit, open, file, hooks, processes);
 }
 
 }  // namespace tomofield::tune

@@ -46,40 +46,38 @@ struct TrialShape {
   FieldOptions field;
   FitOptions fit;
 };
-/// Returns the trials that tune() makes of a run.
-TrialShape trial_of_tune(const FieldOptions& field, const FitOptions& fit);
-/// Returns the trials that choose_by_short_trials() makes of a run whose transfers move what is in
-/// a view by up to `reach_px`. Rows so near to the ends of a strip depend on rows outside, so the
-/// strip is higher by that at both ends, up to 8 rows.
-TrialShape short_trial(const FieldOptions& field, const FitOptions& fit, std::int64_t reach_px = 0);
+/// Returns the trials of a search (choose_settings()): whole_trial() with --tune, else short fits
+/// with plain vertices. Transfers that move what is in a view by up to `reach_px` make the rows so
+/// near to the ends of a strip depend on rows outside, so a short strip is higher by that at both
+/// ends, up to 8 rows.
+TrialShape search_trial(const FieldOptions& field, const FitOptions& fit,
+                        std::int64_t reach_px = 0);
 
-/// Returns the trials that say whether the learned prior helps a run: whole fits of some rows with
-/// plain vertices. Shorter ones say nothing of it, since the end of a fit is what it replaces.
-TrialShape prior_trial(const FieldOptions& field, const FitOptions& fit);
+/// Returns a whole fit of some rows. Trials of the learned prior are such, since the end of a fit is
+/// what that replaces.
+TrialShape whole_trial(const FieldOptions& field, const FitOptions& fit);
 
 /// Returns what trials can choose of `wanted`: there must be a background or undecided beads.
 OpenSettings open_settings(OpenSettings wanted, const measurement::Measurement& measurement);
 
-/// Chooses settings by search_settings(), and then the prior as choose_by_short_trials() does; the
-/// penalty only if `open` has the variation. Chooses the
-/// corrections of the views that are open after that. Trials use some rows in the middle and none
-/// of the views that `measurement` holds out to score the result. `file` stores finished trials,
-/// and trials that it has are not repeated. Returns nothing if a stop was requested. Throws Error
-/// for too few views. Every process calls it.
-std::optional<TunedFit> tune(
+/// Chooses the open settings of a fit by trials on some rows in the middle, without the views that
+/// `measurement` holds out to score the result. It chooses, one after another,
+///
+///   1. total variation: with --tune by search_settings(), with the penalty only if `open` has the
+///      variation; else as choose_variation() does, if `open` has it,
+///   2. the limit of spikes and the corrections of the views that are open (automatic_choice.h),
+///   3. the prior, if it is open, by two trials of whole_trial() with the settings chosen so far.
+///      The learned prior is taken if it predicts better.
+///
+/// Without --tune the trials use plain vertices, whatever the field of the run: the right settings
+/// depend on the specimen, and plain vertices converge in a fraction of the time. Each takes about
+/// 3 % of a fit of 256 rows.
+///
+/// `file`, which may be null, stores finished trials; those that it has are not repeated. Returns
+/// nothing if a stop was requested. Throws Error for too few views. Every process calls it.
+std::optional<TunedFit> choose_settings(
     const measurement::Measurement& measurement, const FieldOptions& field, const FitOptions& fit,
-    const OpenSettings& open, TrialFile& file, const TuneHooks& hooks,
-    const distributed::Communicator& processes = distributed::Communicator::alone());
-
-/// Chooses the open settings by short trials (automatic_choice.h). The trials use plain vertices,
-/// whatever the field of the run: the right settings depend on the specimen, and plain vertices
-/// converge in a fraction of the time. Each trial takes about 3 % of a fit of 256 rows. If the
-/// prior is open, two trials of prior_trial() follow, with the chosen settings, and the learned
-/// prior is taken if it predicts better. Returns nothing if a stop was requested. Every process
-/// calls it.
-std::optional<TunedFit> choose_by_short_trials(
-    const measurement::Measurement& measurement, const FieldOptions& field, const FitOptions& fit,
-    const OpenSettings& open, const TuneHooks& hooks,
+    const OpenSettings& open, TrialFile* file, const TuneHooks& hooks,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
 }  // namespace tomofield::tune

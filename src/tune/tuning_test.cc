@@ -134,7 +134,9 @@ class Tuning : public ::testing::Test {
   TrialFile open(const char* fingerprint = "{}") const { return {file_, fingerprint, true}; }
   std::optional<TunedFit> tuned(TrialFile& file) {
     num_steps_ = 0;
-    return tune(measurement_, field_, fit_, {.variation = true}, file, hooks_);
+    FitOptions thorough = fit_;
+    thorough.tune = true;
+    return choose_settings(measurement_, field_, thorough, {.variation = true}, &file, hooks_);
   }
   static FitTrial some_trial(double variation) {
     return {{Penalty::kSmooth, variation, 3, 4}, {1.5, {1.0, 2.0}}, 0.25};
@@ -213,7 +215,7 @@ TEST_F(Tuning, IsTheSameOnAnyNumberOfThreadsAndCallsFromItsOwn) {
     last_fraction = 0;
     num_reports = 0;
     nlohmann::json json = tuning_json(
-        *choose_by_short_trials(measurement_, field_, fit_, {.variation = true}, hooks_));
+        *choose_settings(measurement_, field_, fit_, {.variation = true}, nullptr, hooks_));
     for (auto& trial : json["trials"]) trial.erase("seconds");
     base::set_thread_count(0);
     EXPECT_NEAR(last_fraction, 1, 1e-9);
@@ -228,14 +230,14 @@ TEST_F(Tuning, IsTheSameOnAnyNumberOfThreadsAndCallsFromItsOwn) {
 
 TEST_F(Tuning, AnExceptionOfTheProgressLeavesIt) {
   hooks_.progress = [](const base::ProgressReport&) { throw Error("enough"); };
-  EXPECT_THROW(choose_by_short_trials(measurement_, field_, fit_, {.variation = true}, hooks_),
+  EXPECT_THROW(choose_settings(measurement_, field_, fit_, {.variation = true}, nullptr, hooks_),
                Error);
 }
 
 TEST_F(Tuning, DoesNotPredictTheViewsThatScoreTheResult) {
   measurement_.held_out = measurement::held_out_views(series_.geometry.tilt_deg, 4);
   const auto penalty =
-      choose_by_short_trials(measurement_, field_, fit_, {.variation = true}, hooks_);
+      choose_settings(measurement_, field_, fit_, {.variation = true}, nullptr, hooks_);
   ASSERT_TRUE(penalty.has_value());
   EXPECT_FALSE(penalty->predicted_views.empty());
   for (const int view : penalty->predicted_views)
@@ -244,7 +246,7 @@ TEST_F(Tuning, DoesNotPredictTheViewsThatScoreTheResult) {
 
 TEST_F(Tuning, TriesBothPenalties) {
   const auto tuned =
-      choose_by_short_trials(measurement_, field_, fit_, {.variation = true}, hooks_);
+      choose_settings(measurement_, field_, fit_, {.variation = true}, nullptr, hooks_);
   ASSERT_TRUE(tuned.has_value());
   const auto number_of = [&](Penalty penalty) {
     return std::ranges::count(tuned->trials, penalty,

@@ -18,7 +18,7 @@ COMMON = {"stack", "--tlt", "--xf", "--aln", "--bin", "--contrast", "--thickness
 def flags_of_keys():
     """Returns the flag of every key in docs/options.md."""
     rows = {key: flags.split(",")[-1] for flags, key in ROW.findall(PAGE.read_text("utf-8"))}
-    assert len(rows) == 90, len(rows)
+    assert len(rows) == 89, len(rows)
     return rows
 
 

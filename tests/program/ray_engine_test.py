@@ -217,8 +217,8 @@ def test_both_engines_agree_on_an_aligned_series():
 
 
 def test_same_bits_for_any_threads_and_after_an_interruption(general):
-    options = ["--epochs", 4, "--rays-per-step", 3000, "--ray-samples", 20, "--view-scale", "on",
-               "--no-margin", "--checkpoint-minutes", 0]
+    options = ["--epochs", 4, "--ray-samples", 20, "--view-scale", "on", "--no-margin",
+               "--checkpoint-minutes", 0]
     one = general.reconstruct("one", general.with_xf(), *options, "--threads", 1)
     two = general.reconstruct("two", general.with_xf(), *options, "--threads", 3)
     assert one.same_as(two)

@@ -91,13 +91,6 @@ TEST(RayDataTerm, AnEpochUsesEachRayOnceInRandomBatches) {
   }
 }
 
-TEST(RayDataTerm, StepsAreAsLargeAsAskedFor) {
-  FitOptions options;
-  options.rays_per_step = 1000;
-  const SphereTerm s(options);
-  EXPECT_EQ(s.term.steps_per_epoch(), (31 * 32 * 21 + 999) / 1000);
-}
-
 TEST(RayDataTerm, RaysThatMissTheRegionAreLeftOut) {
   FitOptions options;
   options.subsets = 3;
