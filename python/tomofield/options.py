@@ -116,7 +116,6 @@ class Options(TypedDict, total=False):
     subsets: int
     engine: Literal["slab", "ray"]
     ray_samples: int
-    rays_per_step: int
     learning_rate: Optional[float]
     factor_variation: float
     boundary: float
