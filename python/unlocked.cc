@@ -7,7 +7,7 @@
 #include <condition_variable>
 #include <mutex>
 
-#include "base/interruption.h"
+#include "base/progress.h"
 
 namespace tomofield::python {
 namespace {

@@ -14,6 +14,7 @@
 #include "align/relaxation.h"
 #include "align/start/exposures.h"
 #include "align/start/slab_pose_search.h"
+#include "align/start/transmission_pitch.h"
 #include "base/statistics.h"
 #include "base/trace.h"
 #include "fit/fit.h"
@@ -169,10 +170,30 @@ class AligningFit {
     return steps;
   }
 
+  // Returns the pitch that the mean intensities of dark views tell, if they see ice alone.
+  std::optional<FoundPitch> pitch_of_ice() const {
+    const ViewOptions& options = problem_.recorded.options();
+    if (options.contrast != Contrast::kDark || !problem_.field.with_margin) return std::nullopt;
+    const double empty_beam = problem_.recorded.empty_beam(), added = options.log_base;
+    std::vector<double> intensities;
+    for (const ViewSums& view : sums_of_views(measurement_, processes_)) {
+      const double value = view.mean() * measurement_.unit;
+      intensities.push_back(options.take_log ? (empty_beam + added) * std::exp(-value) - added
+                                             : empty_beam - value);
+    }
+    return pitch_by_transmission(measurement_.geometry.tilt_deg, intensities,
+                                 measurement_.geometry.thickness * measurement_.pixel_size_A);
+  }
+
   // Finds thickness and pitch of the specimen in the aligned views of full width.
   void find_pose(const SlabPoseSearch& search) {
     const base::TraceSpan span("find pose");
-    found_.pose = search.find({.thickness_px = measurement_.geometry.thickness});
+    const double given_px = measurement_.geometry.thickness;
+    const std::optional<FoundPitch> pitch = pitch_of_ice();
+    found_.pose = search.find({.thickness_px = given_px}, pitch);
+    if (!found_.pose && pitch)  // the thickness stays as unsure as it is
+      found_.pose = FoundPose{.pose = {.thickness_px = given_px, .pitch_deg = pitch->deg},
+                              .error = {.thickness_px = given_px, .pitch_deg = pitch->error_deg}};
     if (!found_.pose) return;
     found_.pose->pose.x_tilt_deg += problem_.plan.x_tilt_deg;
     found_.pose->pose.thickness_px *= measurement_.bin_factor;

@@ -6,6 +6,20 @@
 #include <cmath>
 
 namespace tomofield::base {
+namespace {
+
+std::function<void()>& interruption() {
+  static std::function<void()> check;
+  return check;
+}
+
+}  // namespace
+
+void set_interruption(std::function<void()> check) { interruption() = std::move(check); }
+
+void allow_interruption() {
+  if (interruption()) interruption()();
+}
 
 std::string time_text(double seconds) {
   const long s = std::lround(std::max(0.0, seconds));

@@ -42,6 +42,13 @@ inline ProgressSink part_of(const ProgressSink& whole, double begin, double size
 /// Is thrown by every process of a computation after a stop was requested of one of them.
 struct StopRequested {};
 
+/// Sets what long work calls between its parts where nobody follows its progress, as in sampling.
+/// What it throws ends the work. Any thread calls it, and often. Set it before any work starts.
+void set_interruption(std::function<void()> check);
+
+/// Calls what was set, if anything.
+void allow_interruption();
+
 /// Returns a duration as "2 h 05 min", "3 min 20 s" or "12 s".
 std::string time_text(double seconds);
 

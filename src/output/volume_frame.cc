@@ -44,9 +44,11 @@ Rotation rotation(double pitch_deg, double alpha_deg, int hand) {
   return product(about_y, about_x);
 }
 
-// Returns an angle, or 0 if the views are not sure of it.
+// Returns an angle, or 0 if the views are not sure of it. Its standard error is from eight parts of
+// the rows, so that five of them are as rare as three that are known (Student's t, six degrees of
+// freedom).
 double sure_angle(double angle_deg, double error_deg) {
-  constexpr double kSure = 3.0;
+  constexpr double kSure = 5.0;
   return std::abs(angle_deg) >= kSure * error_deg ? angle_deg : 0.0;
 }
 
@@ -104,7 +106,7 @@ Levelling found_levelling(const ModelInfo& model, const std::filesystem::path& f
     const Levelling found{.pitch_deg = sure_angle(pose.pitch_deg, error.pitch_deg),
                           .x_tilt_deg = sure_angle(pose.x_tilt_deg, error.x_tilt_deg)};
     if (found.pitch_deg == 0.0 && found.x_tilt_deg == 0.0)
-      throw Error("neither the pitch nor the tilt about X is three of its standard errors");
+      throw Error("neither the pitch nor the tilt about X is five of its standard errors");
     tell_levelling(found);
     return found;
   } catch (const std::exception& error) {

@@ -277,7 +277,7 @@ def test_what_the_alignment_found_levels_the_volume(tilted, scratch):
                                 cwd=scratch)
     assert refused.returncode == 2
     assert "TS_01_align.json" in refused.stderr and "--level PITCH,X_TILT" in refused.stderr
-    for errors, level in (((1, 1), f"{PITCH},{-X_TILT}"), ((1, 2), f"{PITCH},0"), ((3, 2), None)):
+    for errors, level in (((1, 0.5), f"{PITCH},{-X_TILT}"), ((1, 1.2), f"{PITCH},0"), ((2, 1.2), None)):
         pose = {"pitch_deg": PITCH, "pitch_error_deg": errors[0], "x_tilt_deg": -X_TILT,
                 "x_tilt_error_deg": errors[1], "thickness_px": 20, "thickness_error_px": 2}
         with open(os.path.join(scratch, "TS_01_align.json"), "w", encoding="utf-8") as file:

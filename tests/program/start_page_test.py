@@ -38,6 +38,8 @@ def test_the_page_has_its_commands_and_a_picture_of_each():
     made = [words[words.index("-o") + 1] for words in start_page.commands() if "-o" in words]
     assert [name.removesuffix(".mrc") for name in made if "_" not in name] == [
         "etomo", "aretomo", "relion", "serialem"]
+    raw = next(words for words in start_page.commands() if "serialem/TS_01.mrc.mdoc" in words)
+    assert "--defocus" in raw  # membranes that lie flat are lost without a contrast transfer
     assert list(start_page.pictures().values()) == [
         start_page.REPORT, *(f"{name}_xy.png" for name in ("etomo", "aretomo", "relion", "serialem"))]
     with open(os.path.join(PROJECT, "bench/gate_expected/readme.json"), encoding="utf-8") as file:

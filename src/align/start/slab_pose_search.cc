@@ -197,10 +197,13 @@ void SlabPoseSearch::find_x_tilt(double thickness_px, FoundPose& found) const {
   found.error.x_tilt_deg = std::sqrt(variance / moment) * 180.0 / std::numbers::pi;
 }
 
-std::optional<FoundPose> SlabPoseSearch::find(const SlabPose& start) const {
+std::optional<FoundPose> SlabPoseSearch::find(const SlabPose& start,
+                                              const std::optional<FoundPitch>& known) const {
   if (views_.front().cols() < 2 * kParts) return std::nullopt;
   SlabPose best = start;
-  const auto pitch_near = [&](double step_deg) {
+  if (known) best.pitch_deg = known->deg;
+  const auto pitch_near = [&](double step_deg) -> std::optional<Peak> {
+    if (known) return Peak{0.0, known->error_deg / step_deg};
     const auto at = [&](double deg) {
       return log_likelihood({best.thickness_px, best.pitch_deg + deg}, start.thickness_px);
     };
@@ -231,7 +234,7 @@ std::optional<FoundPose> SlabPoseSearch::find(const SlabPose& start) const {
   }
   const double change = best.thickness_px / start.thickness_px;
   const bool is_inside = change < kMostFactor && change > 1 / kMostFactor &&
-                         std::abs(best.pitch_deg - start.pitch_deg) < kMostPitch_deg;
+                         (known || std::abs(best.pitch_deg - start.pitch_deg) < kMostPitch_deg);
   if (!is_near || !is_inside) return std::nullopt;
   find_x_tilt(start.thickness_px, found);
   return found;

@@ -10,6 +10,7 @@
 
 #include "align/joint_alignment.h"
 #include "align/registration.h"
+#include "align/start/transmission_pitch.h"
 
 namespace tomofield::alignment {
 
@@ -35,9 +36,10 @@ class SlabPoseSearch {
   /// Returns the most likely pose near `start`: within a factor of two of its thickness and 12° of
   /// its pitch. The x-axis tilt follows from the heights at which the rows of a part of the image
   /// are most likely: they lie on a line. Errors are standard errors, from the differences between
-  /// parts of the rows. Returns nothing if the images are too low, or if the likelihood has no
-  /// maximum there.
-  std::optional<FoundPose> find(const SlabPose& start) const;
+  /// parts of the rows. A pitch that is `known` is kept. Returns nothing if the images are too low,
+  /// or if the likelihood has no maximum there.
+  std::optional<FoundPose> find(const SlabPose& start,
+                                const std::optional<FoundPitch>& known = std::nullopt) const;
 
  private:
   using Columns = Eigen::MatrixXd;  // [column, row]

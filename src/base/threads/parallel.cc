@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "base/system/processors.h"
-#include "base/threads/thread_context.h"
 #include "base/threads/worker_threads.h"
 #include "base/trace.h"
 

@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "base/check.h"
-#include "base/interruption.h"
+#include "base/progress.h"
 #include "base/system/memory.h"
 #include "base/threads/parallel.h"
 #include "field/sampling/aligned_rows.h"

@@ -13,7 +13,7 @@
 
 #include "base/check.h"
 #include "base/log.h"
-#include "base/threads/thread_context.h"
+#include "base/threads/parallel.h"
 #include "io/saving/output_target.h"
 #include "tomofield/error.h"
 
