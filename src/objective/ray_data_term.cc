@@ -69,8 +69,7 @@ std::size_t RayDataTerm::working_memory(const geometry::RayGeometry& geometry,
     bytes_of_ray += (pieces * kBytesPerPiece + samples * kBytesPerSample) / geometry.num_views();
   }
   const double num_rays = static_cast<double>(shape.num_views) *
-                          static_cast<double>(shape.width * shape.num_rows) /
-                          options.subsets;
+                          static_cast<double>(shape.width * shape.num_rows) / options.subsets;
   const double at_once = std::min(num_rays, static_cast<double>(kRaysAtOnce));
   return static_cast<std::size_t>(num_rays * kBytesPerRay + at_once * bytes_of_ray);
 }

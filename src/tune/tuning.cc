@@ -142,11 +142,11 @@ Search short_search(const FitOptions& fit, const OpenSettings& open) {
 
 void log_choice(const TrialSettings& chosen, const FitOptions& fit) {
   if (!fit.tune) return base::log_info("chose " + describe(chosen, TrialSettings{}));
-  base::log_info(fmt::format(
-      "tuned: --tv-penalty {} --tv {:.3f} --rank {} --epochs {} "
-      "--vertex-epochs {} --coarse-epochs {}",
-      base::name_of(chosen.penalty), chosen.variation, chosen.rank, chosen.epochs,
-      fit.vertex_epochs, fit.coarse_epochs));
+  base::log_info(
+      fmt::format("tuned: --tv-penalty {} --tv {:.3f} --rank {} --epochs {} "
+                  "--vertex-epochs {} --coarse-epochs {}",
+                  base::name_of(chosen.penalty), chosen.variation, chosen.rank, chosen.epochs,
+                  fit.vertex_epochs, fit.coarse_epochs));
 }
 
 }  // namespace
@@ -197,8 +197,7 @@ std::optional<TunedFit> choose_settings(const measurement::Measurement& measurem
                                         const TuneHooks& hooks,
                                         const distributed::Communicator& processes) {
   const Search search = fit.tune ? thorough_search(field, fit, open) : short_search(fit, open);
-  const TrialShape shape =
-      search_trial(field, fit, measurement::largest_reach_px(measurement));
+  const TrialShape shape = search_trial(field, fit, measurement::largest_reach_px(measurement));
   TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
                  open.view_scale || fit.fit_view_scale, hooks, search.num_trials, processes);
   const TrialSettings start = with_safe_corrections({.penalty = fit.penalty,

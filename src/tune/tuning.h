@@ -53,8 +53,8 @@ struct TrialShape {
 TrialShape search_trial(const FieldOptions& field, const FitOptions& fit,
                         std::int64_t reach_px = 0);
 
-/// Returns a whole fit of some rows. Trials of the learned prior are such, since the end of a fit is
-/// what that replaces.
+/// Returns a whole fit of some rows. Trials of the learned prior are such, since the end of a fit
+/// is what that replaces.
 TrialShape whole_trial(const FieldOptions& field, const FitOptions& fit);
 
 /// Returns what trials can choose of `wanted`: there must be a background or undecided beads.

@@ -19,9 +19,8 @@ std::vector<std::string> nearest_options(const CLI::App& command, const std::str
   std::vector<std::string> names;
   for (const CLI::Option* option : command.get_options())
     for (const std::string& name : option->get_lnames()) names.push_back(name);
-  std::vector<std::string> nearest =
-      base::nearest_names(unknown.substr(std::min(unknown.find_first_not_of('-'), unknown.size())),
-                          names);
+  std::vector<std::string> nearest = base::nearest_names(
+      unknown.substr(std::min(unknown.find_first_not_of('-'), unknown.size())), names);
   for (std::string& name : nearest) name.insert(0, "--");
   return nearest;
 }
@@ -99,7 +98,8 @@ std::string fault_of_repetition(const CLI::App& command,
 std::string as_spelt(const CLI::App& command, const std::vector<std::string>& arguments,
                      std::string text) {
   const auto goes_on = [&](std::size_t at) {
-    return at < text.size() && (text[at] == '-' || std::isalnum(static_cast<unsigned char>(text[at])));
+    return at < text.size() &&
+           (text[at] == '-' || std::isalnum(static_cast<unsigned char>(text[at])));
   };
   for (const CLI::Option* option : command.get_options()) {
     const std::vector<std::string> names = spellings(*option, arguments);

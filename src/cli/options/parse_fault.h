@@ -6,8 +6,8 @@
 
 namespace tomofield::cli {
 
-/// Returns a sentence on what is wrong with the arguments of the called command, whose parsing threw
-/// `error`. The first of these that applies:
+/// Returns a sentence on what is wrong with the arguments of the called command, whose parsing
+/// threw `error`. The first of these that applies:
 ///
 /// - unknown options, each with known ones that are alike, or else words that belong to no option;
 /// - a stack that does not exist, before options that only a stack needs;
