@@ -61,7 +61,7 @@ def no_option(name: str) -> str:
 
 def _kind_of(name: str) -> str:
     """Return in words what an option takes."""
-    return _words_for(get_type_hints(Options)[name])
+    return _words_for(get_type_hints(Options, {"os": os})[name])
 
 
 def _words_for(hint: Any) -> str:

@@ -157,7 +157,6 @@ class ModelReader {
     info.density_unit = root.number("density_unit", kLargestDensityUnit);
     info.is_dark = root.text("contrast") == "dark";
     info.options_json = root.text("options_json");
-    if (root.has_attribute("alignment_json")) info.alignment_json = root.text("alignment_json");
     info.written_by = root.text("written_by");
     read_geometry(root.group("geometry"), info);
   }
@@ -172,6 +171,8 @@ class ModelReader {
     g.axis_x = group.number("axis_x", base::kLargestNumber);
     g.axis_z = group.number("axis_z", base::kLargestNumber);
     g.tilt_deg = group.read_array<double>("tilt_deg");
+    if (group.has_attribute("alignment_json") || group.has("alignment_json"))
+      info.alignment_json = group.text("alignment_json");
     const auto roi = group.read_array<std::int64_t>("roi");
     require(roi.size() == 4, "its region of interest has no four corners");
     info.roi = {roi[0], roi[1], roi[2], roi[3]};

@@ -37,6 +37,7 @@ void write_geometry(Hdf5Group group, const ModelInfo& info) {
   group.write_integer("hand", g.hand);
   group.write_number("axis_x", g.axis_x);
   group.write_number("axis_z", g.axis_z);
+  if (!info.alignment_json.empty()) group.write_text("alignment_json", info.alignment_json);
   group.write_array<double>("tilt_deg", g.tilt_deg);
   const Integers roi{info.roi.x0, info.roi.y0, info.roi.x1, info.roi.y1};
   group.write_array<std::int64_t>("roi", roi);
@@ -131,7 +132,6 @@ void write_contents(Hdf5Group root, const ModelInfo& info, std::int64_t version,
   root.write_number("density_unit", info.density_unit);
   root.write_text("contrast", info.is_dark ? "dark" : "bright");
   root.write_text("options_json", info.options_json);
-  if (!info.alignment_json.empty()) root.write_text("alignment_json", info.alignment_json);
   write_geometry(root.create_group("geometry"), info);
   write_rest(root);
 }

@@ -299,7 +299,7 @@ def check_levelling(volume, path):
         own = json.load(file)
     model = volume.replace(".mrc", ".h5")
     with h5py.File(model) as file:
-        stated = json.loads(file.attrs["alignment_json"])
+        stated = json.loads(file["geometry"].attrs["alignment_json"])
     assert stated == {name: own[name] for name in ("series", "made_with")}
 
     def level(record_of_run):
