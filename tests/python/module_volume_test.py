@@ -153,7 +153,7 @@ def test_export_takes_the_level_that_was_found(series, tmp_path):
               "log_magnification": 0, "tilt_change_deg": 0, "correlation": 0.9,
               "shift_error_px": [0.1, 0.1], "left_out": False}
              for i, tilt in enumerate(series.tilt_deg)]
-    pose = {"pitch_deg": 5, "pitch_error_deg": 1, "x_tilt_deg": -4, "x_tilt_error_deg": 1,
+    pose = {"pitch_deg": 5, "pitch_error_deg": 1, "x_tilt_deg": -4, "x_tilt_error_deg": 0.5,
             "thickness_px": 16, "thickness_error_px": 2}
     (tmp_path / "tomogram_align.json").write_text(json.dumps(
         {"made_with": {}, "accepted": True, "rotation": True, "magnification": True, "tilt": True,
