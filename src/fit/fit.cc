@@ -124,7 +124,7 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
       may_change_tree_(field_options.tree != TreeKind::kUniform),
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())),
       fitted_views_(measurement.fitted_views()),
-      steps_per_epoch_(options.subsets) {
+      steps_per_epoch_(options_.subsets) {
   if (options_.coarse_epochs > 0 && stages_.front().bin == 1 && options_.engine == Engine::kSlab)
     base::log_info(
         "no coarse stage: leaves of this --leaf-size do not end with slabs of coarse pixels");

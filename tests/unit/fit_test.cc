@@ -244,6 +244,15 @@ TEST(Fit, EveryEpochUsesEachViewOnce) {
   EXPECT_EQ(fit.progress().data_loss.size(), 2u);
 }
 
+TEST(Fit, HasNoMoreStepsInAnEpochThanViews) {
+  const BeadSeries series(geometry::centred_geometry(16, 20, 8, tilts(-48, 48, 8)),
+                          Bead({8, 10, 4}), 4);
+  FitOptions options;
+  options.subsets = 16;  // of 13 views
+  const Fit fit(series.measurement(), small_field(FieldKind::kGrid), options);
+  EXPECT_EQ(fit.steps_per_epoch(), 13);
+}
+
 TEST(Fit, ViewsThatAreLeftOutTellNothing) {
   const Bead bead({15.3, 20.6, 9.2});
   const auto geometry = geometry::centred_geometry(33, 37, 20, tilts(-60, 60, 12));
