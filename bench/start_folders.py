@@ -9,6 +9,7 @@ import numpy as np
 
 AXIS_DEG = 85.0
 PIXEL_A = 10.0
+TARGET_UM = 3.0  # of the defocus
 
 
 class Series:
@@ -108,6 +109,7 @@ def write_serialem(series, folder):
     copy(series, {"tilt_series.mrc": "TS_01.mrc"}, folder)
     with open(series.path("tilt_series.mdoc"), encoding="utf-8") as file:
         text = file.read().replace("tilt_series.mrc", "TS_01.mrc")
+    text = text.replace("TiltAngle", f"TargetDefocus = -{TARGET_UM:g}\nTiltAngle")
     title = f"[T = SerialEM:    Tilt axis angle = {AXIS_DEG:g}, binning = 1  spot = 8  camera = 2]"
     write(folder, "TS_01.mrc.mdoc", f"{title}\nVoltage = 300\n" + text)
 

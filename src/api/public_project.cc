@@ -26,14 +26,7 @@ Project open_project(const ProjectRequest& request) {
                               .series = request.series});
   if (!project) return {choices.files, choices.options, {}};
   for (const auto& file : project->files()) io::add_input(file);
-  for (const Setting& setting : project->settings()) {
-    const std::string wanted =
-        option_table::set_flag_from_text(setting.option, setting.value, choices);
-    if (!wanted.empty())
-      throw Error(fmt::format("{} of '{}' must be {}, not '{}'", setting.entry,
-                              setting.file.string(), wanted, setting.value));
-  }
-  option_table::note_settings(project->settings(), choices);
+  option_table::apply_settings(project->settings(), choices);
   return {choices.files, choices.options, project->warnings()};
 }
 

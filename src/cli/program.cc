@@ -21,7 +21,6 @@
 #include "cli/options/config_file.h"
 #include "cli/options/help_formatter.h"
 #include "cli/options/parse_fault.h"
-#include "cli/options/project_arguments.h"
 #include "cli/terminal/console.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -33,11 +32,10 @@ void print_log(base::LogLevel level, std::string_view message) {
   say("{}{}\n", level == base::LogLevel::kWarning ? "warning: " : "", message);
 }
 
-void add_commands(CLI::App& program, const distributed::Communicator& processes,
-                  const std::vector<Setting>& origins) {
-  add_reconstruct_command(program, processes, origins);
-  add_align_command(program, origins);
-  add_baseline_command(program, origins);
+void add_commands(CLI::App& program, const distributed::Communicator& processes) {
+  add_reconstruct_command(program, processes);
+  add_align_command(program);
+  add_baseline_command(program);
   add_export_command(program);
   add_view_command(program);
   add_evaluate_command(program);
@@ -141,10 +139,9 @@ void print_answer(const CLI::App& program, const CLI::ParseError& request) {
   print_text(answer.str());
 }
 
-// Parses the command line and runs the command. `origins` gets the settings that a project makes.
-// Returns the exit status, or throws.
+// Parses the command line and runs the command. Returns the exit status, or throws.
 int run_command(CLI::App& program, std::vector<std::string> arguments,
-                const distributed::Communicator& processes, std::vector<Setting>& origins) {
+                const distributed::Communicator& processes) {
   if (arguments.empty()) {
     print_text(program.help());
     return report_output(/*is_result=*/true);
@@ -153,7 +150,6 @@ int run_command(CLI::App& program, std::vector<std::string> arguments,
     require_known_command(program, arguments);
     require_shared_command(arguments, processes);
     expand_config_file(program, arguments);
-    origins = expand_project(program, arguments);
   });
   std::vector<std::string> last_first(arguments.rbegin(), arguments.rend());  // for CLI11
   try {
@@ -207,10 +203,9 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
       "`tomofield COMMAND --help` shows what most people use, and `--help-all` in its place shows "
       "all.\n"
       "Example: tomofield reconstruct TS_01/ -o TS_01.mrc   (the folder of an eTomo project)");
-  std::vector<Setting> origins;
-  add_commands(program, processes, origins);
+  add_commands(program, processes);
   try {
-    return run_command(program, {argv + 1, argv + argc}, processes, origins);
+    return run_command(program, {argv + 1, argv + argc}, processes);
   } catch (const distributed::SharedError& error) {
     tell(error.what());
     return 2;

@@ -27,6 +27,15 @@ using Exposures = std::vector<Exposure>;  // [section]
 
 constexpr double kAngstroms_in_um = 1e4;
 
+void tell_of_missing_ctf(const SeriesFiles& files) {
+  const auto target_um =
+      files.mdoc ? io::target_underfocus_um(io::read_mdoc(*files.mdoc)) : std::nullopt;
+  base::log_info(fmt::format(
+      "ctf: none is given (--ctf or --defocus), so the views count as plain projections: "
+      "a tomogram of them lacks contrast at low resolution and keeps the fringes of defocus{}",
+      target_um ? fmt::format("; the target of the .mdoc would be --defocus {}", *target_um) : ""));
+}
+
 // Throws Error if the pixel size is the one that stands for an unknown one.
 void require_pixel_size(const tilt_series::TiltSeriesOptions& input,
                         const tilt_series::PlannedSeries& series, const std::string& stack) {
@@ -333,9 +342,7 @@ std::vector<microscope::ViewTransfer> view_transfers(const tilt_series::TiltSeri
   const SeriesFiles& files = input;
   const ViewOptions& options = input;
   if (!has_ctf(files, options) && !files.ctf && options.contrast == Contrast::kDark)
-    base::log_info(
-        "ctf: none is given (--ctf or --defocus), so the views count as plain projections: "
-        "a tomogram of them lacks contrast at low resolution and keeps the fringes of defocus");
+    tell_of_missing_ctf(files);
   if (!wants_transfers(files, options)) return {};
   const Sections sections = sections_of(input, series);
   require_pixel_size(input, series, sections.stack);

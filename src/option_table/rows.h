@@ -92,8 +92,9 @@ struct Row {
   Range range = {};
   std::string_view automatic = {};  ///< says what is chosen where no value is given
   std::string_view help;
-  bool is_common = false;    ///< shown by --help; --help-all shows all options
-  bool is_required = false;  ///< the command line refuses to do without
+  bool is_common = false;       ///< shown by --help; --help-all shows all options
+  bool is_required = false;     ///< the command line refuses to do without
+  std::string_view rival = {};  ///< key of the option that a user gives in place of this one
 };
 
 /// Returns the name of an enum's value in Python: that of the command line, but for voxel types,

@@ -5,36 +5,115 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <string_view>
 #include <utility>
 
 #include "base/utf8.h"
 #include "option_table/values.h"
+#include "tomofield/error.h"
 
 namespace tomofield::option_table {
 
-void note_settings(std::vector<Setting> settings, Choices& choices) {
-  for (const Row& row : all_rows()) {
-    const bool is_set = std::ranges::any_of(settings, [&](const Setting& setting) {
-      return row.flag == setting.option && setting.instead.empty();
-    });
-    if (!is_set) continue;
-    visit_value(row, choices, []<typename T>(T& value) {
-      if constexpr (requires { value.origin(); }) value = {*value, Origin::kProject};
-    });
-  }
-  choices.options.settings = std::move(settings);
+namespace {
+
+constexpr std::string_view kStack = "stack";
+
+// Returns an option and its value as somebody gave it: "--thickness 200", "--overwrite".
+std::string as_given(std::string_view flag, const Choices& choices) {
+  const std::string value = flag_text_of(flag, choices);
+  const bool is_set_flag = is_flag(rows_of_flag(flag).front()) && value == "true";
+  return is_set_flag ? std::string(flag) : fmt::format("{} {}", flag, value);
 }
 
-void note_replaced_settings(Choices& choices) {
+bool is_given(const Row& row, const Choices& choices) {
+  return origin_of(row, choices) == Origin::kGiven;
+}
+
+// Returns what was given in place of an option: its rival, or an option that it does not go with.
+// Returns an empty text if there is no such option.
+std::string given_against(const Row& row, const Choices& choices) {
+  if (!row.rival.empty() && is_given(row_of(row.rival), choices))
+    return as_given(row_of(row.rival).flag, choices);
+  const bool is_of_dark =
+      row.key == "input.log" || row.key == "input.log_base" || row.key == "input.defocus_um";
+  if (is_of_dark && choices.options.views.contrast == Contrast::kBright) return "--contrast bright";
+  const bool is_transfer = row.group == Group::kTransfer && row.key != "input.voltage_kV";
+  if (is_transfer && choices.options.fit.engine == Engine::kRay) return "--engine ray";
+  return {};
+}
+
+// Returns what holds in place of a setting that is to be applied, or an empty text.
+std::string winner_over(const Setting& setting, const Choices& choices) {
+  if (setting.option == kStack) return {};  // the project itself was given
+  for (const Row& row : rows_of_flag(setting.option))
+    if (is_given(row, choices)) return as_given(row.flag, choices);
+  return given_against(rows_of_flag(setting.option).front(), choices);
+}
+
+void set_from_setting(const Setting& setting, Choices& choices) {
+  const std::string wanted = set_flag_from_text(setting.option, setting.value, choices);
+  if (wanted.empty()) return;
+  throw Error(fmt::format("'{}': {} must be {}, not '{}'", setting.file.string(), setting.entry,
+                          wanted, setting.value));
+}
+
+bool is_as_set(const Setting& setting, const Choices& choices) {
+  Choices as_set = choices;
+  set_flag_from_text(setting.option, setting.value, as_set);
+  return std::ranges::all_of(rows_of_flag(setting.option), [&](const Row& row) {
+    return text_of(row, as_set) == text_of(row, choices);
+  });
+}
+
+// Returns true if a setting that holds has set the option with this key.
+bool is_of_setting(std::string_view key, const Choices& choices) {
+  return std::ranges::any_of(choices.options.settings, [&](const Setting& setting) {
+    return setting.instead.empty() && setting.option == row_of(key).flag;
+  });
+}
+
+void reset(const Row& row, Choices& choices) {
+  const Choices usual;
+  std::visit([&](auto reference) { reference(choices) = reference(const_cast<Choices&>(usual)); },
+             row.member);
+}
+
+}  // namespace
+
+void apply_settings(std::vector<Setting> settings, Choices& choices) {
+  const Choices given = choices;
+  for (Setting& setting : settings) {
+    setting.instead = winner_over(setting, given);
+    if (setting.instead.empty()) set_from_setting(setting, choices);
+  }
+  note_settings(settings, choices);
+}
+
+void note_settings(std::span<const Setting> settings, Choices& choices) {
+  for (const Setting& setting : settings) {
+    choices.options.settings.push_back(setting);
+    if (!setting.instead.empty()) continue;
+    std::erase(choices.options.given, setting.option);
+    for (const Row& row : rows_of_flag(setting.option)) {
+      visit_value(row, choices, []<typename T>(T& value) {
+        if constexpr (requires { value.origin(); }) value = {*value, Origin::kProject};
+      });
+    }
+  }
+}
+
+void settle_settings(Choices& choices) {
   for (Setting& setting : choices.options.settings) {
     const std::span<const Row> rows = rows_of_flag(setting.option);
     if (rows.empty() || !setting.instead.empty()) continue;  // an option of another command
-    Choices as_set = choices;
-    set_flag_from_text(setting.option, setting.value, as_set);
-    const bool is_replaced = std::ranges::any_of(
-        rows, [&](const Row& row) { return text_of(row, as_set) != text_of(row, choices); });
-    if (is_replaced)
-      setting.instead = fmt::format("{} {}", setting.option, flag_text_of(setting.option, choices));
+    const Row& row = rows.front();
+    if (!is_as_set(setting, choices)) {
+      setting.instead = as_given(row.flag, choices);
+    } else if (row.rival.empty() || !is_of_setting(row.rival, choices)) {
+      setting.instead = given_against(row, choices);
+      if (!setting.instead.empty())
+        for (const Row& of_flag : rows) reset(of_flag, choices);
+    }
   }
 }
 

@@ -11,13 +11,19 @@
 
 namespace tomofield::option_table {
 
-/// Notes the settings that the files of a project made among the options, and gives the values that
-/// they set their origin, but for those in whose place something else holds.
-void note_settings(std::vector<Setting> settings, Choices& choices);
+/// Sets the options to the settings that the files of a project made, and notes these in
+/// Options::settings. An option that somebody gave wins over the setting of a project, and so does
+/// one that is given in its place (Row::rival) or that it does not go with: the setting then says
+/// in Setting::instead what holds. Throws Error for a value that the option cannot have.
+void apply_settings(std::vector<Setting> settings, Choices& choices);
 
-/// Notes in Options::settings what holds in place of those whose values the options no longer have,
-/// because a user has gone over them.
-void note_replaced_settings(Choices& choices);
+/// Notes that options which were set already come from these files (the choice of a batch), and not
+/// from who gave them.
+void note_settings(std::span<const Setting> settings, Choices& choices);
+
+/// Notes in Options::settings what holds in place of those that somebody has gone over since
+/// apply_settings(), and takes those back in whose place another option was given since.
+void settle_settings(Choices& choices);
 
 /// Returns settings as an array of objects with the members of Setting, for the metrics. Those that
 /// are empty for most settings (row, instead) are left out there.

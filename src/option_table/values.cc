@@ -315,6 +315,12 @@ std::vector<std::string> range_faults(const Options& options) {
       if constexpr (kIsNumber<Value>) {
         const auto require = [&](Value number) {
           if (row.range.contains(static_cast<double>(number))) return;
+          const Choices usual;
+          if (text_of(row, usual) == text_of(row, choices)) {  // a default that stands for no value
+            faults.push_back(
+                fmt::format("{} is required: it must be {}", flag_of(row.key), row.range.text()));
+            return;
+          }
           const auto as_real = static_cast<double>(number);
           const bool is_huge = std::isfinite(as_real) && as_real > base::kLargestNumber;
           faults.push_back(fmt::format(

@@ -43,7 +43,7 @@ std::string label_of(const Row& row);
 bool is_flag(const Row& row);
 
 /// Returns a sentence for every number that is out of its range: "--rank must be from 1 to 256,
-/// not 0".
+/// not 0". A number whose default is out of its range is required.
 std::vector<std::string> range_faults(const Options& options);
 
 /// Returns all options as nested objects, named after the keys of the table. Options that have no

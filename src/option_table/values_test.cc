@@ -1,5 +1,6 @@
 #include "option_table/values.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "option_table/setting.h"
+#include "tomofield/error.h"
 
 namespace tomofield::option_table {
 namespace {
@@ -150,7 +152,8 @@ TEST(OptionTable, ValuesSayWhereTheyComeFrom) {
   EXPECT_EQ(origin("fit.seed", choices), Origin::kGiven);
   choices.options.fit.epochs.derive(9);  // it is chosen already
   EXPECT_EQ(choices.options.fit.epochs, *Options().fit.epochs);
-  note_settings({{"--tv", "3", "a.toml", "tv"}}, choices);
+  const std::vector<Setting> of_file{{"--tv", "3", "a.toml", "tv"}};
+  note_settings(of_file, choices);
   EXPECT_EQ(origin("fit.density_variation", choices), Origin::kProject);
   EXPECT_EQ(choices.options.settings.size(), 1u);
   EXPECT_EQ(origin("input.bin", choices), Origin::kDefault);
@@ -162,13 +165,13 @@ TEST(OptionTable, SettingsSayWhatHoldsInTheirPlace) {
   Choices choices;
   choices.options.specimen.thickness = 300;
   choices.options.specimen.axis_x = 12;
-  note_settings({{"--thickness", "300", "tilt.com", "THICKNESS"},
-                 {"--center", "12", "tilt.com", "OFFSET"},
-                 {"--bin", "2", "tilt.com", "IMAGEBINNED", "", "--angpix 10"},
-                 {"--cs", "2.7", "ctfcorrection.com", "SphericalAberration"}},
-                choices);
+  const std::vector<Setting> settings{{"--thickness", "300", "tilt.com", "THICKNESS"},
+                                      {"--center", "12", "tilt.com", "OFFSET"},
+                                      {"--bin", "2", "tilt.com", "IMAGEBINNED", "", "--angpix 10"},
+                                      {"--cs", "2.7", "ctfcorrection.com", "SphericalAberration"}};
+  note_settings(settings, choices);
   const auto instead = [&] {
-    note_replaced_settings(choices);
+    settle_settings(choices);
     std::string all;
     for (const Setting& setting : choices.options.settings) all += setting.instead + ";";
     return all;
@@ -178,6 +181,57 @@ TEST(OptionTable, SettingsSayWhatHoldsInTheirPlace) {
   choices.options.specimen.axis_x = 13;
   choices.options.specimen.axis_z = 3.5;
   EXPECT_EQ(instead(), "--thickness 200;--center 13,3.5;--angpix 10;--cs none;");
+}
+
+// What a project sets beside options that somebody gave: "--bin 2;--angpix 10" for the option and
+// what holds in its place.
+std::string applied(const Setting& setting, Choices choices) {
+  apply_settings({setting}, choices);
+  return fmt::format("{};{}", flag_text_of(setting.option, choices),
+                     choices.options.settings.front().instead);
+}
+
+TEST(OptionTable, GivenOptionsWinOverSettings) {
+  const Setting bin{"--bin", "2", "newst.com", "BinByFactor"};
+  EXPECT_EQ(applied(bin, {}), "2;");
+  Choices given;
+  given.options.given = {"--bin"};
+  EXPECT_EQ(applied(bin, given), "1;--bin 1");
+  given = {};
+  given.options.views.angpix = 10;
+  EXPECT_EQ(applied(bin, given), "1;--angpix 10");
+  given = {};
+  given.options.views.contrast = Contrast::kBright;
+  EXPECT_EQ(applied({"--log", "true", "tilt.com", "LOG"}, given), "false;--contrast bright");
+  EXPECT_EQ(applied({"--defocus", "3", "a.mdoc", "TargetDefocus"}, given),
+            "none;--contrast bright");
+  given = {};
+  given.files.ctf = "none";
+  EXPECT_EQ(applied({"--defocus", "3", "a.mdoc", "TargetDefocus"}, given), "none;--ctf none");
+  given = {};
+  given.options.fit.engine = Engine::kRay;
+  EXPECT_EQ(applied({"--ctf", "a.txt", "a.txt", "CTF"}, given), "none;--engine ray");
+  EXPECT_EQ(applied({"--voltage", "200", "a.mdoc", "Voltage"}, given), "200;");
+  given = {};
+  given.options.run.overwrite = true;
+  EXPECT_EQ(applied({"--overwrite", "true", "a", "b"}, given), "true;--overwrite");
+}
+
+TEST(OptionTable, OptionsGivenLaterTakeSettingsBack) {
+  Choices choices;
+  apply_settings({{"--bin", "2", "newst.com", "BinByFactor"}, {"--aln", "a.aln", "a.aln", "ROT"}},
+                 choices);
+  choices.options.views.angpix = 10;
+  settle_settings(choices);
+  EXPECT_EQ(choices.options.settings[0].instead, "--angpix 10");
+  EXPECT_EQ(choices.options.views.bin, 1);
+  EXPECT_EQ(choices.options.settings[1].instead, "");
+  EXPECT_EQ(choices.files.aln, "a.aln");
+}
+
+TEST(OptionTable, SettingsThatCannotBeReadAreRefused) {
+  Choices choices;
+  EXPECT_THROW(apply_settings({{"--bin", "two", "newst.com", "BinByFactor"}}, choices), Error);
 }
 
 TEST(OptionTable, TextsThatCannotBeReadSayWhatIsWanted) {

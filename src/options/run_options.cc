@@ -63,7 +63,7 @@ constexpr double kLeastFactor = 0.05, kMostFactor = 20;
 
 Options resolve(const SeriesFiles& files, const Options& requested) {
   option_table::Choices choices{files, requested};
-  option_table::note_replaced_settings(choices);
+  option_table::settle_settings(choices);
   Options options = std::move(choices.options);
   option_table::choose_by_contrast(options);
   choose_field(options);

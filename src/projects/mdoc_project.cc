@@ -9,6 +9,17 @@
 namespace tomofield::projects {
 
 namespace fs = std::filesystem;
+namespace {
+
+// Sets the defocus that the session aimed at, which nobody has measured. It needs a pixel size.
+void set_target_defocus(Project& project, const fs::path& file, const io::Mdoc& mdoc) {
+  const auto underfocus_um = io::target_underfocus_um(mdoc);
+  if (underfocus_um && mdoc.pixel_spacing_A)
+    project.set("--defocus", fmt::format("{}", *underfocus_um), file, "TargetDefocus");
+}
+
+}  // namespace
+
 void read_mdoc_project(Project& project) {
   const fs::path mdoc = project.request().path;
   const io::Mdoc contents = io::read_mdoc(mdoc);
@@ -21,7 +32,8 @@ void read_mdoc_project(Project& project) {
   project.set("--mdoc", mdoc.string(), mdoc, "ZValue");
   fs::path stem = mdoc.stem();
   if (stem.has_extension()) stem = stem.stem();  // "TS_01" of "TS_01.mrc.mdoc"
-  set_transfer_files(project, mdoc.parent_path(), stem.string());
+  if (!set_transfer_files(project, mdoc.parent_path(), stem.string()))
+    set_target_defocus(project, mdoc, contents);
   if (contents.voltage_kV)
     project.set("--voltage", fmt::format("{}", *contents.voltage_kV), mdoc, "Voltage");
 }

@@ -391,6 +391,25 @@ TEST(AreTomoProject, ThicknessAndStack) {
   expect_parts(project.warnings()[1], {"BetaOffset", "-0.5"});
 }
 
+TEST(MdocProject, SetsTheTargetOfTheDefocusWhereNothingMeasuresIt) {
+  const ScratchDirectory folder;
+  write_stack(folder / "TS.mrc", 16, 12, 1, some_value);
+  const auto set_by = [&](const std::string& text) {
+    std::string all;
+    const auto mdoc = folder.write("TS.mdoc", text);
+    for (const Setting& setting : read_project({.path = mdoc})->settings())
+      if (setting.option == "--defocus" || setting.option == "--ctf")
+        all += setting.option + " " + setting.value + " " + setting.entry;
+    return all;
+  };
+  const std::string with_pixels = "PixelSpacing = 5\n",
+                    target = "[ZValue = 0]\nTiltAngle = 1\nTargetDefocus = -3.5\n";
+  EXPECT_EQ(set_by(with_pixels + target), "--defocus 3.5 TargetDefocus");
+  EXPECT_EQ(set_by(target), "");
+  folder.write("TS_ctf.txt", "1 30000 30000 0 0 0.5 5\n");
+  EXPECT_EQ(set_by(with_pixels + target), "--ctf " + (folder / "TS_ctf.txt").string() + " CTF");
+}
+
 TEST(MdocProject, FindsTheStackOrTheImages) {
   const ScratchDirectory folder;
   const auto mdoc = folder.write("TS.mdoc",

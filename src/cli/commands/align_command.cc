@@ -1,15 +1,14 @@
 #include <filesystem>
 #include <memory>
-#include <vector>
 
 #include "cli/commands/commands.h"
 #include "cli/commands/run_reconstruction.h"
 #include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
+#include "cli/options/project_options.h"
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
 #include "option_table/rows.h"
-#include "option_table/setting.h"
 #include "options/run_options.h"
 #include "reconstruct/reconstruct.h"
 
@@ -18,9 +17,8 @@ namespace {
 
 using option_table::Group;
 
-void run(const CLI::App& command, option_table::Choices& choices,
-         const std::vector<Setting>& origins) {
-  note_origins(command, origins, choices);
+void run(const CLI::App& command, option_table::Choices& choices) {
+  open_project(command, choices);
   options::ReconstructOptions options = options::run_options(choices.files, choices.options);
   stop_on_signals(false);
   const auto& alone = distributed::Communicator::alone();
@@ -30,7 +28,7 @@ void run(const CLI::App& command, option_table::Choices& choices,
 
 }  // namespace
 
-void add_align_command(CLI::App& program, const std::vector<Setting>& origins) {
+void add_align_command(CLI::App& program) {
   CLI::App& command = *program.add_subcommand(
       "align", "Align the views of a tilt series with each other, without a reconstruction");
   auto choices = std::make_shared<option_table::Choices>();
@@ -54,7 +52,7 @@ void add_align_command(CLI::App& program, const std::vector<Setting>& origins) {
       "Example: tomofield align series.mrc --tlt series.tlt --align full --thickness 1200 \\\n"
       "           -o series.mrc\nThe files are called after the output: series_align.xf, .tlt, "
       ".aln, .json and .png");
-  command.callback([&command, choices, &origins] { run(command, *choices, origins); });
+  command.callback([&command, choices] { run(command, *choices); });
 }
 
 }  // namespace tomofield::cli

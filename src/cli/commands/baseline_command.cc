@@ -17,6 +17,7 @@
 #include "cli/options/common_options.h"
 #include "cli/options/fit_options.h"
 #include "cli/options/help_formatter.h"
+#include "cli/options/project_options.h"
 #include "cli/options/table_options.h"
 #include "cli/options/trace_option.h"
 #include "cli/terminal/console.h"
@@ -29,7 +30,6 @@ namespace tomofield::cli {
 namespace {
 
 using option_table::Group;
-using Origins = std::vector<Setting>;
 
 struct BaselineArguments {
   option_table::Choices choices;
@@ -91,8 +91,8 @@ void run_method(const baseline::BaselineOptions& options, const baseline::Method
   print_pictures(paths.pictures());
 }
 
-void run(const CLI::App& command, BaselineArguments& arguments, const Origins& origins) {
-  note_origins(command, origins, arguments.choices);
+void run(const CLI::App& command, BaselineArguments& arguments) {
+  open_project(command, arguments.choices);
   baseline::BaselineOptions& options = arguments.options;
   options.files = arguments.choices.files;
   options.shared = arguments.choices.options;
@@ -155,7 +155,7 @@ void add_run_options(CLI::App& command, BaselineArguments& arguments) {
 }
 
 // Registers a method.
-void add_method(CLI::App& baseline, const Origins& origins, const char* name, const char* help) {
+void add_method(CLI::App& baseline, const char* name, const char* help) {
   CLI::App& command = *baseline.add_subcommand(name, help);
   const auto arguments = std::make_shared<BaselineArguments>();
   arguments->options.method = *baseline::method_named(name);
@@ -170,27 +170,25 @@ void add_method(CLI::App& baseline, const Origins& origins, const char* name, co
   add_common_options(command);
   add_trace_option(command, arguments->trace);
   add_help_all(command);
-  command.callback([&command, arguments, &origins] { run(command, *arguments, origins); });
+  command.callback([&command, arguments] { run(command, *arguments); });
 }
 
 }  // namespace
 
-void add_baseline_command(CLI::App& program, const Origins& origins) {
+void add_baseline_command(CLI::App& program) {
   CLI::App& command =
       *program.add_subcommand("baseline", "Reconstruct by another method, to compare with");
   command.require_subcommand(1);
-  add_method(command, origins, "wbp",
-             "Weighted (filtered) back-projection: a ramp filter with a roll-off");
-  add_method(command, origins, "sirt",
+  add_method(command, "wbp", "Weighted (filtered) back-projection: a ramp filter with a roll-off");
+  add_method(command, "sirt",
              "Simultaneous iterative reconstruction, stopped before it fits the noise");
-  add_method(command, origins, "sart-tv",
+  add_method(command, "sart-tv",
              "Ordered subsets of views, with steps down the total variation between passes");
-  add_method(command, origins, "tv",
-             "Least squares with total variation, by Chambolle and Pock's method");
-  add_tensorf(command, origins);
-  add_method(command, origins, "ingp",
+  add_method(command, "tv", "Least squares with total variation, by Chambolle and Pock's method");
+  add_tensorf(command);
+  add_method(command, "ingp",
              "A multi-resolution hash grid and a small network, as in Instant-NGP");
-  add_method(command, origins, "fourier-net",
+  add_method(command, "fourier-net",
              "A network of plane waves, which learns the noise of each view");
 }
 

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
 #include "batch/choice.h"
 #include "cli/commands/run_reconstruction.h"
 #include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
+#include "option_table/setting.h"
 #include "reconstruct/reconstruct.h"
 
 namespace tomofield::cli {
@@ -30,8 +32,9 @@ void add_batch_choice_option(CLI::App& command, std::optional<std::filesystem::p
       ->group(kHelpAllGroup);
 }
 
-void add_settings_of_batch(const CLI::App& command, const std::filesystem::path& file,
-                           std::vector<Setting>& settings) {
+void note_choice_of_batch(const CLI::App& command, const std::filesystem::path& file,
+                          option_table::Choices& choices) {
+  std::vector<Setting> settings;
   for (const option_table::GivenOption& given : given_options(command, {})) {
     if (!given.value || !batch::is_shared(given.flag)) continue;
     settings.push_back({.option = given.flag,
@@ -39,6 +42,7 @@ void add_settings_of_batch(const CLI::App& command, const std::filesystem::path&
                         .file = file,
                         .entry = "choice for all series of the batch"});
   }
+  option_table::note_settings(settings, choices);
 }
 
 void write_choice(const std::filesystem::path& file, const options::ReconstructOptions& options,

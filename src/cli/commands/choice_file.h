@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <optional>
-#include <vector>
 
 #include "distributed/communicator.h"
 #include "options/run_options.h"
@@ -16,9 +15,9 @@ void add_choice_option(CLI::App& command, std::optional<std::filesystem::path>& 
 /// Registers --batch-choice, which names the file of the choice that a batch gives its runs.
 void add_batch_choice_option(CLI::App& command, std::optional<std::filesystem::path>& file);
 
-/// Adds to `settings` those options of a parsed command that the choice of a batch made.
-void add_settings_of_batch(const CLI::App& command, const std::filesystem::path& file,
-                           std::vector<Setting>& settings);
+/// Notes that those options of a parsed command that the choice of a batch sets come from its file.
+void note_choice_of_batch(const CLI::App& command, const std::filesystem::path& file,
+                          option_table::Choices& choices);
 
 /// Makes the trials of a run alone, and writes as JSON what they choose (null if nothing is left to
 /// trials), for programs that give one choice to several runs (batch). Throws ExitStatus if it was

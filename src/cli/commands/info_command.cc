@@ -13,6 +13,7 @@
 #include "base/enum_names.h"
 #include "cli/commands/commands.h"
 #include "cli/options/help_formatter.h"
+#include "cli/options/project_options.h"
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
 #include "io/images/mrc.h"
@@ -236,8 +237,10 @@ void add_info_command(CLI::App& program) {
   command->get_option("stack")->description(
       "An MRC file, a model (.h5), or a tilt series: a stack, raw or aligned, or a project");
   add_help_all(*command);
-  command->callback(
-      [choices] { print_info(tilt_series::series_options(choices->files, choices->options)); });
+  command->callback([command, choices] {
+    open_project(*command, *choices);
+    print_info(tilt_series::series_options(choices->files, choices->options));
+  });
 }
 
 }  // namespace tomofield::cli

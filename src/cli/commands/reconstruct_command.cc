@@ -1,7 +1,6 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "cli/commands/choice_file.h"
 #include "cli/commands/commands.h"
@@ -9,6 +8,7 @@
 #include "cli/commands/run_reconstruction.h"
 #include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
+#include "cli/options/project_options.h"
 #include "cli/options/table_options.h"
 #include "cli/options/trace_option.h"
 #include "options/run_options.h"
@@ -38,10 +38,11 @@ void require_output(RunOptions& run, bool dry_run) {
 }
 
 void run(const CLI::App& command, ReconstructArguments& arguments,
-         const distributed::Communicator& processes, std::vector<Setting> origins) {
+         const distributed::Communicator& processes) {
   require_output(arguments.choices.options.run, arguments.dry_run.is_wanted);
-  if (arguments.batch_choice) add_settings_of_batch(command, *arguments.batch_choice, origins);
-  note_origins(command, origins, arguments.choices);
+  processes.run_collectively([&] { open_project(command, arguments.choices); });
+  if (arguments.batch_choice)
+    note_choice_of_batch(command, *arguments.batch_choice, arguments.choices);
   options::ReconstructOptions options =
       options::run_options(arguments.choices.files, arguments.choices.options);
   processes.run_collectively([&] {
@@ -60,8 +61,7 @@ void run(const CLI::App& command, ReconstructArguments& arguments,
 
 }  // namespace
 
-void add_reconstruct_command(CLI::App& program, const distributed::Communicator& processes,
-                             const std::vector<Setting>& origins) {
+void add_reconstruct_command(CLI::App& program, const distributed::Communicator& processes) {
   CLI::App& command = *program.add_subcommand(
       "reconstruct", "Reconstruct a tomogram and a model from a tilt series");
   auto arguments = std::make_shared<ReconstructArguments>();
@@ -82,9 +82,7 @@ void add_reconstruct_command(CLI::App& program, const distributed::Communicator&
   command.footer(
       "Example: tomofield reconstruct series.mrc --tlt series.tlt --xf series.xf --bin 4 \\\n"
       "           --thickness 1200 -o tomogram.mrc");
-  command.callback([&command, arguments, &processes, &origins] {
-    run(command, *arguments, processes, origins);
-  });
+  command.callback([&command, arguments, &processes] { run(command, *arguments, processes); });
 }
 
 }  // namespace tomofield::cli

@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "base/check.h"
 #include "baseline/neural/tensorf.h"
@@ -11,9 +10,9 @@
 #include "cli/options/common_options.h"
 #include "cli/options/fit_options.h"
 #include "cli/options/help_formatter.h"
+#include "cli/options/project_options.h"
 #include "cli/options/table_options.h"
 #include "cli/options/trace_option.h"
-#include "option_table/setting.h"
 #include "options/run_options.h"
 #include "output/output_paths.h"
 
@@ -40,9 +39,8 @@ int size_of_node(const options::ReconstructOptions& options) {
   return baseline::one_node_size(tilt_series::PlannedSeries(options.input()), options);
 }
 
-void run(const CLI::App& command, TensorfArguments& arguments,
-         const std::vector<Setting>& origins) {
-  note_origins(command, origins, arguments.choices);
+void run(const CLI::App& command, TensorfArguments& arguments) {
+  open_project(command, arguments.choices);
   Options& requested = arguments.choices.options;
   if (arguments.non_negative)
     requested.field.activation =
@@ -60,7 +58,7 @@ void run(const CLI::App& command, TensorfArguments& arguments,
 
 }  // namespace
 
-void add_tensorf(CLI::App& baseline, const std::vector<Setting>& origins) {
+void add_tensorf(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
       "tensorf", "One factorised tensor for the whole region, coarse to fine, as in TensoRF");
   const auto arguments = std::make_shared<TensorfArguments>();
@@ -74,7 +72,7 @@ void add_tensorf(CLI::App& baseline, const std::vector<Setting>& origins) {
   add_common_options(command);
   add_trace_option(command, arguments->trace);
   add_help_all(command);
-  command.callback([&command, arguments, &origins] { run(command, *arguments, origins); });
+  command.callback([&command, arguments] { run(command, *arguments); });
 }
 
 }  // namespace tomofield::cli

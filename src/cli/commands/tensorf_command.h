@@ -1,13 +1,10 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <vector>
-
-#include "option_table/setting.h"
 
 namespace tomofield::cli {
 
 /// Registers `baseline tensorf`.
-void add_tensorf(CLI::App& baseline, const std::vector<Setting>& origins);
+void add_tensorf(CLI::App& baseline);
 
 }  // namespace tomofield::cli

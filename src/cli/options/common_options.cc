@@ -7,8 +7,6 @@
 
 #include "base/threads/parallel.h"
 #include "cli/options/number_checks.h"
-#include "cli/options/table_options.h"
-#include "option_table/setting.h"
 
 namespace tomofield::cli {
 
@@ -63,19 +61,6 @@ bool is_given(const CLI::Option& option, const std::vector<std::string>& argumen
     const std::string name = argument.substr(0, argument.find('='));
     return name.rfind('-', 0) == 0 && option.check_name(name);
   });
-}
-
-void note_origins(const CLI::App& command, const std::vector<Setting>& settings,
-                  option_table::Choices& choices) {
-  option_table::note_settings(settings, choices);
-  for (const CLI::Option* option : command.get_options()) {
-    const option_table::Row* row = option->count() == 0 ? nullptr : row_of_option(*option);
-    if (row == nullptr) continue;
-    const bool is_of_file = std::ranges::any_of(settings, [&](const Setting& setting) {
-      return setting.instead.empty() && option->check_name(setting.option);
-    });
-    if (!is_of_file) choices.options.given.emplace_back(row->flag);
-  }
 }
 
 }  // namespace tomofield::cli

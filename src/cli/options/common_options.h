@@ -43,11 +43,6 @@ CLI::Option* add_enum_option(CLI::App& command, const std::string& flag, Target&
 std::vector<option_table::GivenOption> given_options(const CLI::App& command,
                                                      const std::vector<std::string>& except);
 
-/// Notes the settings that files made (Options::settings), and which options the user gave
-/// (Options::given): those of a parsed command that no setting made.
-void note_origins(const CLI::App& command, const std::vector<Setting>& settings,
-                  option_table::Choices& choices);
-
 /// Returns the subcommand that the leading words of the arguments name.
 const CLI::App* find_command(const CLI::App& program, const std::vector<std::string>& arguments);
 

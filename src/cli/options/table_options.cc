@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/options/project_arguments.h"
+#include "cli/options/project_options.h"
 
 namespace tomofield::cli {
 namespace {

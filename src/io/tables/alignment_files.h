@@ -60,9 +60,10 @@ struct MdocSection {
   std::optional<double> pixel_spacing_A;
   std::optional<double> prior_dose;  ///< PriorRecordDose: electrons / Å² before this section
   std::optional<double> dose;        ///< ExposureDose: electrons / Å² of this section; 0: unknown
-  std::optional<std::int64_t> time_s;  ///< DateTime, in seconds from some day on
-  std::optional<double> rotation_deg;  ///< RotationAngle
-  std::string frame_name;              ///< SubFramePath without its folders
+  std::optional<std::int64_t> time_s;       ///< DateTime, in seconds from some day on
+  std::optional<double> rotation_deg;       ///< RotationAngle
+  std::optional<double> target_defocus_um;  ///< TargetDefocus: negative under focus
+  std::string frame_name;                   ///< SubFramePath without its folders
 };
 
 /// The tilt axis of the images, counter-clockwise from +Y, and the line that says so.
@@ -97,6 +98,10 @@ void set_axis_of_tomography(const AxisAngle& stated, bool is_title, Mdoc& mdoc);
 /// Reads an .mdoc file. Skips unknown keys, because SerialEM adds new ones every year. Throws Error
 /// for a section that comes twice.
 Mdoc read_mdoc(const std::filesystem::path& path);
+
+/// Returns the underfocus in µm at which the sections were to be recorded: the median of their
+/// TargetDefocus. Returns nothing if none states one, or if it is not under focus.
+std::optional<double> target_underfocus_um(const Mdoc& mdoc);
 
 /// The order in which the sections of an .mdoc were recorded.
 struct AcquisitionOrder {

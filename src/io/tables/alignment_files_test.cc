@@ -384,6 +384,21 @@ TEST(Mdoc, ReadsTheMicroscope) {
   EXPECT_FALSE(read_mdoc(scratch.write("a.mdoc", "Voltage = 0\n[ZValue = 0]\n")).voltage_kV);
 }
 
+TEST(Mdoc, ReadsTheDefocusThatTheSessionAimedAt) {
+  const ScratchDirectory scratch;
+  const auto target_um = [&](const char* text) {
+    return target_underfocus_um(read_mdoc(scratch.write("a.mdoc", text)));
+  };
+  EXPECT_EQ(target_um("[ZValue = 0]\nTargetDefocus = -3\n[ZValue = 1]\n"
+                      "[ZValue = 2]\nTargetDefocus = -3\n[ZValue = 3]\nTargetDefocus = -5\n"),
+            3.0);
+  for (const char* none :
+       {"[ZValue = 0]\nDefocus = -3\n", "[ZValue = 0]\nTargetDefocus = 0\n",
+        "[ZValue = 0]\nTargetDefocus = 2\n", "[ZValue = 0]\nTargetDefocus = nan\n",
+        "[ZValue = 0]\nTargetDefocus = -1e9\n"})
+    EXPECT_FALSE(target_um(none)) << none;
+}
+
 TEST(AreTomoSections, NeverAssumes) {
   expect_parts(message_of<Error>([] {
                  assign({0, 1, 2}, {3}, 7);

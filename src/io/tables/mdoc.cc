@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "base/statistics.h"
 #include "io/named_file.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/text_lines.h"
@@ -60,6 +61,8 @@ void choose_axis(const StatedAxes& axes, Mdoc& mdoc) {
     set_axis_of_tomography(*axes.entry, /*is_title=*/false, mdoc);
   }
 }
+
+constexpr double kLargestDefocus_um = 1000;
 
 // Returns a voltage that a microscope can have, or nothing. SerialEM writes 0 or -1 if it does not
 // know it.
@@ -172,6 +175,8 @@ void read_section_entry(const std::filesystem::path& path, const TextLine& line,
     section->time_s = parse_time(entry.value);
   } else if (entry.key == "RotationAngle") {
     section->rotation_deg = parse_number(entry.value, base::kLargestAngle_deg);
+  } else if (entry.key == "TargetDefocus") {
+    section->target_defocus_um = parse_number(entry.value, kLargestDefocus_um);
   } else if (entry.key == "SubFramePath") {
     section->frame_name = without_folders(entry.value);
   }
@@ -235,6 +240,15 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
   sort_and_require_unique(path, &mdoc);
   choose_axis(axes, mdoc);
   return mdoc;
+}
+
+std::optional<double> target_underfocus_um(const Mdoc& mdoc) {
+  std::vector<double> underfocus_um;
+  for (const MdocSection& section : mdoc.sections)
+    if (section.target_defocus_um) underfocus_um.push_back(-*section.target_defocus_um);
+  if (underfocus_um.empty()) return std::nullopt;
+  const double target_um = base::median(std::move(underfocus_um));
+  return target_um > 0.0 ? std::optional(target_um) : std::nullopt;
 }
 
 AcquisitionOrder acquisition_order(const Mdoc& mdoc) {
