@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <variant>
@@ -26,6 +27,7 @@
 #include "measurement/prepare.h"
 #include "measurement/undecided_beads.h"
 #include "measurement/view_transfers.h"
+#include "option_table/setting.h"
 #include "option_table/values.h"
 #include "output/metrics_record.h"
 #include "output/model_file.h"
@@ -170,6 +172,10 @@ tilt_series::TiltSeriesOptions BaselineOptions::input() const {
 }
 
 void settle(BaselineOptions& options) {
+  option_table::Choices choices{std::move(options.files), std::move(options.shared)};
+  option_table::settle_settings(choices);
+  options.files = std::move(choices.files);
+  options.shared = std::move(choices.options);
   const bool by_contrast = options.shared.views.contrast != Contrast::kDark;
   std::visit(
       [&](auto& method) {
@@ -268,6 +274,9 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
         problem, options.method, series.mean_density,
         report_to(progress.reconstruction, facts_of(options.method), problem.num_rays()));
   }();
+  if (!std::isfinite(solution.data_loss.back()))
+    throw Error(
+        "the reconstruction diverged: check the numbers of the views and the method's options");
   const double fit_seconds = running.seconds();
   const MethodSize size = size_of(options.method, problem.grid(), problem.num_rows());
   std::optional<measurement::ViewErrors> errors;

@@ -58,8 +58,16 @@ json job_json(const Job& job) {
           {"trials", needs.num_trials}};
 }
 
+// Returns the name of a series. Files of a batch are called after it, so it names no other folder.
+std::string name_at(const json& object) {
+  auto name = object.at("name").get<std::string>();
+  if (!name.empty() && name != "." && name != ".." && fs::path(name).filename() == name)
+    return name;
+  throw Error(fmt::format("a series cannot be called '{}'", name));
+}
+
 Job job_from(const json& object) {
-  return {.name = object.at("name").get<std::string>(),
+  return {.name = name_at(object),
           .output = object.at("output").get<std::string>(),
           .command = object.at("command").get<std::vector<std::string>>(),
           .needs = {.memory_bytes_of_one_thread = bytes_at(object, "memory_bytes_of_one_thread"),

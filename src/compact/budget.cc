@@ -19,10 +19,12 @@ struct Unit {
 
 const std::map<std::string, Unit>& units() {
   using Kind = Budget::Kind;
-  static const std::map<std::string, Unit> all{
-      {"dB", {Kind::kDecibels, 1, 0.001, 10}},  {"", {Kind::kParameters, 1, 1, 1e12}},
-      {"k", {Kind::kParameters, 1e3, 1, 1e12}}, {"M", {Kind::kParameters, 1e6, 1, 1e12}},
-      {"kB", {Kind::kBytes, 1e3, 1000, 1e15}},  {"MB", {Kind::kBytes, 1e6, 1000, 1e15}}};
+  static const std::map<std::string, Unit> all{{"dB", {Kind::kDecibels, 1, 0.001, kMostDecibels}},
+                                               {"", {Kind::kParameters, 1, 1, 1e12}},
+                                               {"k", {Kind::kParameters, 1e3, 1, 1e12}},
+                                               {"M", {Kind::kParameters, 1e6, 1, 1e12}},
+                                               {"kB", {Kind::kBytes, 1e3, 1000, 1e15}},
+                                               {"MB", {Kind::kBytes, 1e6, 1000, 1e15}}};
   return all;
 }
 
@@ -46,9 +48,9 @@ Budget parse_budget(const std::string& text) {
       return {unit->second.kind, amount};
   }
   throw Error(fmt::format(
-      "'{}' is no budget: give decibels from 0.001dB to 10dB, parameters such as 500k or 2M, or a "
+      "'{}' is no budget: give decibels from 0.001dB to {}dB, parameters such as 500k or 2M, or a "
       "size of 1kB or more such as 5MB",
-      text));
+      text, kMostDecibels));
 }
 
 }  // namespace tomofield::compact

@@ -249,7 +249,7 @@ class Compression {
   }
 
   double step_of(double rounding_error) const {
-    return std::sqrt(rounding_error / std::max(error_of_step_, 1e-300));
+    return error_of_step_ > 0.0 ? std::sqrt(rounding_error / error_of_step_) : 0.0;
   }
 
   // Finds the factors of the places that are chosen.
@@ -393,6 +393,14 @@ CompactField within(const Budget& budget, Compression& compression, const FileSi
 
 }  // namespace
 
+void require_likeness(const CompressionReport& report) {
+  if (!(report.decibels > kMostDecibels)) return;
+  throw Error(
+      fmt::format("a model of {} parameters would be another tomogram (the PSNR falls by "
+                  "{:.0f} dB): give a larger budget",
+                  report.parameters, report.decibels));
+}
+
 CompressionReport joined(const CompressionReport& a, const CompressionReport& b) {
   CompressionReport both{
       .parameters = a.parameters + b.parameters,
@@ -414,7 +422,9 @@ CompactField compress(const field::Field& vertices, const Rectangle& roi, const 
                       const FileSize& file_size) {
   const base::TraceSpan span("compress");
   Compression compression(vertices, roi, rows_of(vertices), kLargestSide, 0.0);
-  return within(budget, compression, file_size);
+  CompactField made = within(budget, compression, file_size);
+  require_likeness(made.report);
+  return made;
 }
 
 CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget,

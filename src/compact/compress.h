@@ -28,6 +28,9 @@ struct CompressionReport {
 /// Returns the report of two parts of a field together.
 CompressionReport joined(const CompressionReport& a, const CompressionReport& b);
 
+/// Throws Error if a field changed by more than a budget of decibels may allow (kMostDecibels).
+void require_likeness(const CompressionReport& report);
+
 /// A field as factors that are few and have short codes.
 struct CompactField {
   CodedField coded;
@@ -56,9 +59,9 @@ using FileSize = std::function<std::size_t(const CodedField&)>;
 ///
 /// The model is within the budget. A budget in bytes is that of the whole file, whose size
 /// `file_size` returns; without it, that of the codes alone. Throws Error if none is found within a
-/// budget in bytes or in parameters. For a budget in decibels, up to eight models of finer and
-/// finer rounding are made; if none is within it, the last model is returned, and `report.decibels`
-/// is above the budget.
+/// budget in bytes or in parameters, or, for a whole field, as require_likeness() does. For a
+/// budget in decibels, up to eight models of finer and finer rounding are made; if none is within
+/// it, the last model is returned, and `report.decibels` is above the budget.
 CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget,
                       const FileSize& file_size = {});
 CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget,

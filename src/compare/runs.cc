@@ -95,7 +95,10 @@ std::optional<Grid> grid_to_be(const CompareOptions& options, const RunHooks& ho
   const base::ChildResult result = base::run_child(command, log, hooks.stop_requested);
   if (hooks.must_stop()) return std::nullopt;
   if (result.exit_status != 0)
-    throw Error(fmt::format("{}: {}", row.run.name, base::reason_of_failure(log)));
+    throw Error(
+        fmt::format("{}: {}", row.run.name, base::reason_of_failure(result.exit_status, log)));
+  if (!io::is_file(grid))
+    throw Error(fmt::format("{}: its dry run has written no plan", row.run.name));
   return record::read_planned_grid(grid);
 }
 

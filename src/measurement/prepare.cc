@@ -120,7 +120,8 @@ ViewBrightness view_brightness(std::span<const float> image, std::span<const std
   }
   if (n == 0) return {};
   const double mean = s / n;
-  const double variance = ss / n - mean * mean;
+  // Immense numbers leave less than nothing.
+  const double variance = std::max(ss / n - mean * mean, 0.0);
   return {mean, std::sqrt(std::max(variance - noise * noise, 1e-4 * variance))};
 }
 

@@ -32,9 +32,13 @@ void require_common_units(const tilt_series::TiltSeries& series,
   const std::vector<double>& noise = series.noise_sigma();
   const double usual_contrast = base::median(std::vector(contrasts.begin(), contrasts.end()));
   const double usual_noise = base::median(noise);
-  if (!(usual_contrast > 0 && usual_noise > 0)) return;
+  if (!(usual_noise > 0)) return;
+  // Beside a view of immense numbers the others have no contrast: the empty beam is that view's.
+  const bool has_contrast = usual_contrast > 0;
   for (std::size_t view = 0; view < contrasts.size(); ++view) {
-    const double power = units_of(contrasts[view] / usual_contrast, noise[view] / usual_noise);
+    const double noise_factor = noise[view] / usual_noise;
+    const double power =
+        units_of(has_contrast ? contrasts[view] / usual_contrast : noise_factor, noise_factor);
     if (std::fabs(power) <= kUsual) continue;
     const auto section = series.views()[view].section + 1;
     const std::string what = fmt::format(

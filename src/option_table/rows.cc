@@ -98,7 +98,7 @@ constexpr Row kRows[] = {
      .group = Group::kImages, .unit = "intensity", .range = Range::between(-1e6, 1e6),
      .help = "Added to all intensities before the logarithm, as IMOD's LOG (with --log)"},
     {.key = "input.black_level", .flag = "--black-level", MEMBER(options.views, black_level),
-     .group = Group::kImages, .unit = "intensity",
+     .group = Group::kImages, .unit = "intensity", .range = Range::between(-1e6, 1e6),
      .automatic = "what trials prefer, up to the intensity of the emptiest places; 0 without trials",
      .help = "Intensity that the detector adds to every pixel of a bright series"},
 
@@ -380,12 +380,11 @@ const Row* find(std::string_view key) {
 }  // namespace
 
 bool Range::contains(double value) const {
-  if (kind == Kind::kAny) return true;
   if (!std::isfinite(value)) return false;
   const bool is_between = value >= low && value <= high;
   switch (kind) {
     case Kind::kAny:
-      return true;
+      return base::is_plausible(value);
     case Kind::kBetween:
       return is_between;
     case Kind::kZeroOrBetween:

@@ -269,8 +269,8 @@ TEST(OptionTable, EveryNumberIsCheckedAgainstItsRange) {
   const double infinity = std::numeric_limits<double>::infinity();
   int num_numbers = 0;
   for (const Row& row : all_rows()) {
-    if (row.range.kind == Range::Kind::kAny) continue;
     for (const double bad : {nan, infinity, -1e7}) {
+      if (row.range.kind == Range::Kind::kAny && bad == -1e7) continue;
       Choices choices{{}, good};
       visit_value(row, choices, [&]<typename T>(T& value) {
         if constexpr (std::is_same_v<T, double> || std::is_same_v<T, std::optional<double>> ||

@@ -10,11 +10,15 @@
 #include <utility>
 #include <vector>
 
+#include "base/log.h"
+#include "base/plausible.h"
 #include "base/trace.h"
 #include "distributed/gathered_arrays.h"
+#include "io/images/mrc_format.h"
 #include "io/images/ome_zarr.h"
 #include "io/saving/atomic_folder.h"
 #include "io/saving/output_set.h"
+#include "io/saving/output_target.h"
 #include "output/box_bounds.h"
 #include "output/model_input_record.h"
 #include "output/sample_model.h"
@@ -148,6 +152,30 @@ std::filesystem::path zarr_path(const std::filesystem::path& volume) {
   return path.replace_extension(".zarr");
 }
 
+namespace {
+
+// Throws Error unless the disk has room for a volume and for its OME-Zarr, which ends in whole
+// chunks: many more bytes than a thin volume has itself.
+void require_room_for_both(const std::filesystem::path& path, const io::MrcSpec& spec) {
+  const base::CheckedSize zarr = io::ome_zarr_bytes({spec.nx, spec.ny, spec.nz}, spec.mode);
+  const base::CheckedSize volume =
+      base::CheckedSize(spec.nx) * spec.ny * spec.nz * io::bytes_per_value(spec.mode);
+  const auto bytes = (volume + zarr).find();
+  if (!bytes) throw Error(fmt::format("cannot write '{}': no disk has room for it", path.string()));
+  io::require_room(io::folder_of(path), zarr_path(path), *bytes);
+}
+
+void warn_of_old_zarr(const std::filesystem::path& volume) {
+  const std::filesystem::path zarr = zarr_path(volume);
+  std::error_code absent;
+  if (!std::filesystem::exists(zarr / io::kZarrMarker, absent)) return;
+  base::log_warning(
+      fmt::format("'{}' stays as it is, and is not of the new '{}': remove it, or give --zarr",
+                  zarr.string(), volume.string()));
+}
+
+}  // namespace
+
 void write_zarr(const std::filesystem::path& volume, ZarrVersion version) {
   const base::TraceSpan span("write OME-Zarr");
   const io::OutputSet* const results = io::OutputSet::active();
@@ -224,6 +252,8 @@ void write_voxels(const VoxelSource& source, const OrientedBox& box, const Model
   spec.origin_A = origin_A(info, box, options.axes);
   spec.labels = volume_labels(info, made_by);
 
+  if (options.zarr) processes.run_collectively([&] { require_room_for_both(path, spec); });
+
   double scale = options.invert ? -info.output_scale() : info.output_scale();
   if (options.voxel_type == VoxelType::kInt16) {
     { const io::MrcWriter probe(path, spec, processes); }  // refuses before the pass, not after it
@@ -235,7 +265,7 @@ void write_voxels(const VoxelSource& source, const OrientedBox& box, const Model
   io::MrcWriter file(path, spec, processes);
   processes.run_collectively([&] { source(PartWriter(file, box, options.axes, scale)); });
   file.close();
-  if (!options.zarr) return;
+  if (!options.zarr) return warn_of_old_zarr(path);
   processes.run_collectively([&] {
     if (processes.is_root()) write_zarr(path, options.zarr_version);
   });

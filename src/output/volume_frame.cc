@@ -105,13 +105,20 @@ Levelling found_levelling(const ModelInfo& model, const std::filesystem::path& f
     const auto& [pose, error] = *record.pose;
     const Levelling found{.pitch_deg = sure_angle(pose.pitch_deg, error.pitch_deg),
                           .x_tilt_deg = sure_angle(pose.x_tilt_deg, error.x_tilt_deg)};
-    if (found.pitch_deg == 0.0 && found.x_tilt_deg == 0.0)
-      throw Error("neither the pitch nor the tilt about X is five of its standard errors");
+    if (found.pitch_deg == 0.0 && found.x_tilt_deg == 0.0) {
+      throw Error(
+          fmt::format("it is level as far as the views tell, with a pitch of {:.1f} ± {:.1f}° and "
+                      "a tilt about X "
+                      "of {:.1f} ± {:.1f}°, and only angles of five standard errors are used",
+                      pose.pitch_deg, error.pitch_deg, pose.x_tilt_deg, error.x_tilt_deg));
+    }
     tell_levelling(found);
     return found;
   } catch (const std::exception& error) {
-    throw Error(fmt::format("'{}' does not tell how to level the specimen: {}; {}", path.string(),
-                            error.what(), kAdvice));
+    throw Error(
+        fmt::format("'{}' has nothing to level the specimen by: {}; leave --level out, or "
+                    "{}",
+                    path.string(), error.what(), kAdvice));
   }
 }
 

@@ -114,11 +114,11 @@ RunPlan plan_run(const tilt_series::PlannedSeries& series, const options::Recons
   RunPlan run;
   const tune::OpenSettings open = given.open_settings();
   // Only the views tell whether there is a background or an undecided bead.
-  run.num_trials = given.num_trials(
-      num_fitted_views(plan, given.fit),
-      {.variation = open.variation, .spikes = open.spikes, .view_scale = open.view_scale});
-  run.has_too_few_views_for_trials = open.any() && run.num_trials == 0 &&
-                                     given.num_trials(options::kFewestViewsOfTrials, open) > 0;
+  const tune::OpenSettings planned{
+      .variation = open.variation, .spikes = open.spikes, .view_scale = open.view_scale};
+  run.num_trials = given.num_trials(num_fitted_views(plan, given.fit), planned);
+  run.has_too_few_views_for_trials =
+      run.num_trials == 0 && given.num_trials(options::kFewestViewsOfTrials, planned) > 0;
   if (run.num_trials > 0) require_views_for_trials(plan, given.fit);
   const options::ReconstructOptions options = run.num_trials > 0 ? given.with_open_prior() : given;
   const fit::Domain domain = plan.ray_geometry

@@ -102,6 +102,12 @@ void Project::require_no_stray_ignored() const {
   }
 }
 
+void require_no_series(const Request& request) {
+  if (request.series.empty()) return;
+  throw Error(fmt::format("'{}' is one series, so leave --series {} out", request.path.string(),
+                          request.series));
+}
+
 std::optional<Project> read_project(const Request& request) {
   std::error_code absent;
   MainFile main{format_of(request.path), request.path};
@@ -109,10 +115,8 @@ std::optional<Project> read_project(const Request& request) {
     main = find_main_file(request.path, request.has_mdoc);
   else if (!fs::exists(request.path, absent))
     return std::nullopt;
+  if (main.format == nullptr || !main.format->has_several) require_no_series(request);
   if (main.format == nullptr) return std::nullopt;
-  if (!request.series.empty() && !main.format->has_several)
-    throw Error(fmt::format("'{}' is one series, so leave --series {} out", request.path.string(),
-                            request.series));
   Request of_file = request;
   of_file.path = main.path;
   Project project(of_file);

@@ -72,6 +72,9 @@ struct Format {
   bool has_several = false;  ///< a project may have several series, of which --series names one
 };
 
+/// Throws Error if the user chose a series (--series) of what is one series.
+void require_no_series(const Request& request);
+
 /// Returns all kinds of projects.
 std::span<const Format> all_formats();
 

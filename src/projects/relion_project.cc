@@ -27,6 +27,10 @@ const io::RelionTomogram& choose_tomogram(const std::vector<io::RelionTomogram>&
                                           const Request& request) {
   if (request.series.empty() && tomograms.size() == 1) return tomograms.front();
   const auto found = std::ranges::find(tomograms, request.series, &io::RelionTomogram::name);
+  if (std::ranges::count(tomograms, request.series, &io::RelionTomogram::name) > 1) {
+    throw Error(fmt::format("'{}' has several rows with the rlnTomoName '{}': give each its own",
+                            request.path.string(), request.series));
+  }
   if (found != tomograms.end()) return *found;
   throw Error(request.series.empty()
                   ? fmt::format("'{}' has {} tomograms, {}: name one with --series",
@@ -65,6 +69,7 @@ void set_optics(Project& project, const io::RelionTomogram& tomogram, const fs::
 void read_relion_project(Project& project) {
   const fs::path star = project.request().path;
   if (!io::lists_tomograms(star)) {
+    require_no_series(project.request());
     set_views(project, star, star, "rlnMicrographName", {});
     return;
   }

@@ -87,7 +87,10 @@ void log_alignment(const alignment::AlignmentRecord& record) {
     base::log_info("the alignment stays as it was, since a new one is no better: " + errors);
   }
   if (record.beads) log_beads(*record.beads);
-  if (record.pose) log_pose(*record.pose);
+  if (record.pose)
+    log_pose(*record.pose);
+  else
+    base::log_info("the views do not tell how thick the specimen is, nor its pitch");
   if (record.local) log_local_motion(*record.local);
   if (!left_out.empty())
     base::log_warning(fmt::format("left out, since they do not resemble the specimen: sections {}",
@@ -183,6 +186,12 @@ bool align_series(options::ReconstructOptions& options, const tune::TuneHooks& h
   }
   apply_alignment(record, options);
   log_alignment(record);
+  if (options.run.align == Alignment::kFull && !record.is_accepted) {
+    base::log_warning(
+        "the views are as good as not aligned, since no alignment predicted views better than "
+        "none: "
+        "check --tilt-axis and --thickness, or align them with another program");
+  }
   return true;
 }
 

@@ -190,6 +190,7 @@ record::RunRecord record_of_tiles(const Run& run, const Example& example,
   verdict.seconds = run.options.since_start.seconds();
   verdict.peak_GiB = static_cast<double>(base::peak_memory()) / (1 << 30);
   record.tiles = record::TilesRecord{example.tile.own, finished.tiles()};
+  compact::require_likeness(finished.report());
   record.compact =
       record::CompactRecord{finished.report(), finished.sum_of(&FinishedTile::seconds_compressing)};
   return record;

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
+#include <string>
 #include <vector>
 
 #include "io/images/jpeg.h"
 #include "io/images/png.h"
+#include "io/saving/positioned_file.h"
 #include "tomofield/error.h"
 
 namespace tomofield::report {
@@ -20,9 +20,10 @@ constexpr std::int64_t kLongestSide_px = 1400;
 constexpr int kQuality = 85;
 
 std::string read_bytes(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw Error(fmt::format("cannot read the picture '{}'", path.string()));
-  return {std::istreambuf_iterator<char>(file), {}};
+  const io::PositionedFile file(path, io::PositionedFile::Access::kRead);
+  std::string bytes(static_cast<std::size_t>(file.size()), '\0');
+  file.read_at(0, bytes.data(), bytes.size());
+  return bytes;
 }
 
 // Returns the mean of a channel over the square of `factor` pixels a side that begins at a corner.

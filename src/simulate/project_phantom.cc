@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "base/progress.h"
 #include "base/threads/parallel.h"
 #include "simulate/gaussian_rows.h"
 #include "simulate/line_integrals.h"
@@ -110,6 +111,7 @@ void project_rows(const Phantom& phantom, const ViewFrame& view, std::int64_t fi
 void project_view(const Phantom& phantom, const ViewFrame& view, std::span<float> image) {
   const std::int64_t num_bands = (view.height + kBandRows - 1) / kBandRows;
   base::parallel_for("project phantom", num_bands, [&](std::int64_t band) {
+    base::allow_interruption();
     const std::int64_t first = band * kBandRows;
     const std::int64_t count = std::min(kBandRows, view.height - first);
     project_rows(phantom, view, first, count,

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/check.h"
+#include "base/progress.h"
 #include "base/threads/parallel.h"
 #include "simulate/gaussian_rows.h"
 
@@ -99,6 +100,7 @@ void rasterize_sections(const Phantom& phantom, std::int64_t first_section,
                   "the sections' buffer has another size");
   const std::int64_t bands = (shape.ny + kBandRows - 1) / kBandRows;
   base::parallel_for("rasterize", num_sections * bands, [&](std::int64_t unit) {
+    base::allow_interruption();
     const std::int64_t section = unit / bands;
     const std::int64_t first_row = unit % bands * kBandRows;
     const std::int64_t num_rows = std::min(kBandRows, shape.ny - first_row);

@@ -140,8 +140,10 @@ Search short_search(const FitOptions& fit, const OpenSettings& open) {
           }};
 }
 
-void log_choice(const TrialSettings& chosen, const FitOptions& fit) {
-  if (!fit.tune) return base::log_info("chose " + describe(chosen, TrialSettings{}));
+// Says what was chosen, in the words of log_trials().
+void log_choice(const TunedFit& tuned, const FitOptions& fit) {
+  const TrialSettings& chosen = tuned.settings;
+  if (!fit.tune) return base::log_info("chose " + describe(chosen, tuned.trials.front().settings));
   base::log_info(
       fmt::format("tuned: --tv-penalty {} --tv {:.3f} --rank {} --epochs {} "
                   "--vertex-epochs {} --coarse-epochs {}",
@@ -214,7 +216,7 @@ std::optional<TunedFit> choose_settings(const measurement::Measurement& measurem
   });
   if (!tuned) return std::nullopt;
   log_trials(*tuned, field.kind);
-  log_choice(tuned->settings, fit);
+  log_choice(*tuned, fit);
   if (!fit.tune) tuned->settings.epochs = fit.epochs;
   return with_prior(std::move(tuned), measurement, field, fit, open, file, hooks, processes);
 }

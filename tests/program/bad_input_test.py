@@ -238,6 +238,11 @@ def test_views_in_other_units_are_named(good, refuse_series, stack_file, tmp_pat
         values[4] *= np.float32(factor)
         name = stack_file("units.mrc", values)
         refuse_series(["section 5", "other units", "--exclude 5"], name)
+    for factor in (1e4, 1e8, 1e12):  # the empty beam is then that of this view
+        values = structured.max() + 50 - structured
+        values[4] *= np.float32(factor)
+        refuse_series(["section 5", "other units", "--exclude 5"], stack_file("units.mrc", values),
+                      "--contrast", "dark")
     for factor, warns in ((100, True), (0.01, True), (10, False)):
         values = structured.copy()
         values[4] *= np.float32(factor)
@@ -282,6 +287,7 @@ def test_options_that_make_no_sense(good, out, refuse, refuse_series, stack, tlt
         "--ifp-ring": ["median"],
         "--checkpoint-minutes": [-1, "nan"],
         "--seed": [-1, 1.5, 1e40],
+        "--black-level": ["nan", "-inf", 1e15],
         "--hand": [0, 2],
         "--center": ["nan", "20,nan", 1e9, "20,-1e9", "1,2,3"],
         "--roi": ["0,0,41,33", "-1,0,9,9", "5,5,5,9", "9,9,3,3", "0,0,9", "0,0,9,9,9", "a,b,c,d",

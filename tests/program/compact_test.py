@@ -166,6 +166,8 @@ def test_wrong_requests_get_a_sentence(folder, tmp_path):
     fit, compact = os.path.join(folder, "fit.h5"), tmp_path / "compact.h5"
     refuse("export", fit, "--compact", compact, "--budget", "3 apples", says="is no budget")
     assert not compact.exists()
+    refuse("export", fit, "--compact", compact, "--budget", 50, says="give a larger budget")
+    assert not compact.exists()
     harness.succeed("export", fit, "--compact", compact)
     refuse("export", compact, "--compact", tmp_path / "twice.h5", says="is compact already")
     factors = tmp_path / "factors.mrc"
@@ -180,6 +182,10 @@ def test_wrong_requests_get_a_sentence(folder, tmp_path):
     harness.succeed(*fit_arguments(folder), "--budget", "1dB", "-o", volume)
     refuse(*fit_arguments(folder), "--budget", "1dB", "-o", volume, "--resume",
            says="is no checkpoint")
+    kept = tmp_path / "kept.mrc"
+    refuse(*fit_arguments(folder), "--budget", 50, "-o", kept, says="the finished fit is kept in")
+    harness.succeed(*fit_arguments(folder), "--budget", "1dB", "-o", kept, "--resume")
+    assert np.ptp(harness.read_volume(kept)) > 0
     # It is refused before the alignment, which takes long.
     refuse(*fit_arguments(folder), "--align", "refine", "-o", volume, "--resume",
            says="it has no state of a fit, as no compact model has one")

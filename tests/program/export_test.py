@@ -7,7 +7,9 @@ import io
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
+import time
 
 import h5py
 import mrcfile
@@ -102,6 +104,34 @@ def test_a_volume_larger_than_its_disk_or_the_memory_is_refused_before_the_work(
     assert not pathlib.Path("large.mrc").exists()
 
 
+def test_room_is_that_of_the_volume_and_its_zarr():
+    """A plane ends in chunks of 64 voxels: the Zarr store is 64 times as large."""
+    result = harness.tomofield("export", "model.h5", "-o", "plane.mrc", "--center", "16,16,8", "--size",
+                               "60000,60000,1", "--zarr", timeout=60)
+    assert result.returncode == 2 and "plane.zarr" in result.stderr and "its disk" in result.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stopped_export_leaves_nothing(number, tmp_path):
+    model = os.path.abspath("model.h5")
+    run = harness.start("export", model, "-o", "long.mrc", "--center", "16,16,8", "--size",
+                        "1500,1500,1500", "--rotate", "10,20,30", cwd=tmp_path)
+    next(line for line in run.stderr if "may take about" in line)
+    run.send_signal(number)
+    _, said = run.communicate(timeout=60)
+    assert run.returncode == 128 + number and "stopped; nothing was written" in said
+    assert not [name for name in os.listdir(tmp_path) if "long" in name]
+
+
+def test_a_stopped_simulation_leaves_nothing(tmp_path):
+    run = harness.start("simulate", "series", "--size", 512, cwd=tmp_path)
+    time.sleep(1)
+    run.send_signal(signal.SIGTERM)
+    _, said = run.communicate(timeout=60)
+    assert run.returncode == 128 + signal.SIGTERM and "stopped; nothing was written" in said
+    assert not any(os.scandir(tmp_path / "series")) if (tmp_path / "series").exists() else True
+
+
 def test_a_long_export_says_how_long_before_the_work():
     command = [harness.PROGRAM, "export", "model.h5", "-o", "long.mrc", "--center", "16,16,8", "--size",
                "2000,2000,2000", "--rotate", "10,20,30"]
@@ -134,6 +164,8 @@ def test_binned_voxels_are_means(whole):
 def test_axes_rotation_and_sign(whole):
     # With IMOD's axes, trimvol -rx turns the sections back: z = rows - 1 - row.
     values = export("--axes", "xzy")[0]
+    said = harness.succeed("export", "model.h5", "-o", "sizes.mrc", "--axes", "xzy").stdout
+    assert " × ".join(map(str, values.shape[::-1])) + " voxels (x, z, y)" in said
     check_close(values[:, ::-1].transpose(1, 0, 2), whole, whole)
     # After a quarter turn about z (RELION's rot) the box's x lies along -y of the tomogram.
     values = export("--center", f"{X0 + 18},{Y0 + 18},10.5", "--size", "20,30,11", "--rotate",

@@ -385,6 +385,8 @@ def test_an_mdoc_brings_its_stack_its_angles_and_its_axis(series):
     by_hand, _ = reconstruct("mdoc_by_hand", stack, "--tlt", series.tlt, "--xf", xf, *common)
     imported, _ = reconstruct("of_mdoc", mdoc, "--xf", xf, *common)
     assert_same_voxels(imported, by_hand)
+    refuse(["TS_01.st", "is one series", "--series"], stack, "--series", "TS_02", "--tlt", series.tlt,
+           *common)
     aligned, _ = reconstruct("aligned_mdoc", folder, "--ignore", "TiltAxisAngle", *common)
     plain, _ = reconstruct("plain", stack, "--tlt", series.tlt, *common)
     assert_same_voxels(aligned, plain)
@@ -441,6 +443,10 @@ def test_tiff_stacks_of_every_kind(series):
     for kind, white in (("uint8", 255), ("uint16", 65535)):
         tifffile.imwrite(tif, (white - counts[:, ::-1]).astype(kind), photometric="miniswhite")
         assert volume(tif) == expected, kind
+    # Rows may begin at the bottom (Orientation 4).
+    tifffile.imwrite(tif, counts.astype("uint16"), photometric="minisblack",
+                     extratags=[(274, "H", 1, 4, False)])
+    assert volume(tif) == expected
     info = harness.succeed("info", tif).stdout
     assert f"{WIDTH} × {HEIGHT} × {NUM_VIEWS}" in info
 
@@ -458,6 +464,17 @@ def test_tiff_files_that_are_no_stack(series):
     refuse(["a.tif", "from white"], tif, *common)
     tifffile.imwrite(tif, np.zeros((8, 8), np.float64))
     refuse(["a.tif", "64 bits"], tif, *common)
+    for orientation in (2, 3, 5, 6, 7, 8):
+        tifffile.imwrite(tif, np.zeros((8, 8), np.uint16), extratags=[(274, "H", 1, orientation, True)])
+        refuse(["a.tif", f"Orientation {orientation}"], tif, *common)
+    plain = dict(photometric="minisblack", resolutionunit="CENTIMETER")
+    for across, down in ((1e7, 5e6), (5e6, 1e7), (1e7, 1e3)):  # pixels an inch of 10 and 20 Å
+        tifffile.imwrite(tif, np.zeros((20, 16, 16), np.uint16), resolution=(across, down), **plain)
+        refuse(["a.tif", "pixels of"], tif, *common)
+    with tifffile.TiffWriter(tif) as file:
+        for per_cm in (1e7, 2e7):
+            file.write(np.zeros((16, 16), np.uint16), resolution=(per_cm, per_cm), **plain)
+    refuse(["a.tif", "several kinds", "5 × 5 Å"], tif, *common)
     with tifffile.TiffWriter(tif) as writer:
         for size in (8, 9):
             writer.write(np.zeros((size, 8), np.uint8), photometric="minisblack")

@@ -226,6 +226,24 @@ def test_the_row_of_the_series_is_taken_though_others_name_the_same_file(relion)
     assert row["rlnTomoName"] == "TS_02"
 
 
+def test_a_name_that_two_rows_have_is_refused(relion):
+    path = relion.path("Tomograms/job009/same_names.star")
+    with open(relion.star, encoding="utf-8") as file:
+        text = file.read()
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text.replace("TS_02 ", "TS_01 "))
+    result = harness.tomofield("reconstruct", path, "--series", "TS_01", "-o", relion.path("same.mrc"),
+                               *QUICK, cwd=relion.folder)
+    assert result.returncode == 2 and "several rows" in result.stderr, result.stderr
+
+
+def test_one_series_has_no_name_to_choose(relion):
+    views = relion.path("Tomograms/job009/tilt_series/TS_01.star")
+    result = harness.tomofield("reconstruct", views, "--series", "TS_02", "-o", relion.path("no.mrc"),
+                               *QUICK, cwd=relion.folder)
+    assert result.returncode == 2 and "is one series" in result.stderr, result.stderr
+
+
 def test_a_missing_image_is_named(relion):
     star_projects.write_relion_views(relion.folder, "TS_02", ["gone/a.mrc"] * len(TILTS))
     result, _ = relion.run("--series", "TS_02", run=harness.tomofield)

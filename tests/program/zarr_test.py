@@ -101,7 +101,19 @@ def test_a_store_into_which_others_put_something_stays(finished, version):
     os.mkdir(path + ".zarr/labels")
     refused = harness.tomofield(*command)
     assert refused.returncode == 2 and "'labels'" in refused.stderr, refused.stderr
-    assert os.path.isdir(path + ".zarr/labels")
+    os.rmdir(path + ".zarr/labels")
+    for foreign in ("0/notes.txt", "0/0/notes.txt", "9/thesis.mrc", "0/labels/a"):
+        os.makedirs(os.path.dirname(f"{path}.zarr/{foreign}"), exist_ok=True)
+        open(f"{path}.zarr/{foreign}", "w", encoding="utf-8").close()
+        refused = harness.tomofield(*command)
+        assert refused.returncode == 2 and "tomofield has not made" in refused.stderr, foreign
+        assert os.path.isfile(f"{path}.zarr/{foreign}")
+        os.remove(f"{path}.zarr/{foreign}")
+        if foreign.split("/")[-2] in ("9", "labels"):
+            os.rmdir(os.path.dirname(f"{path}.zarr/{foreign}"))
+    harness.succeed(*command)
+    plain = [word for word in command if not word.startswith("--zarr") and word != version]
+    assert "is not of the new" in harness.succeed(*plain).stderr
 
 
 # Debian's python3-zarr does not know the final version 3, so this reads it by the specification

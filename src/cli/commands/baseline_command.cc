@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/threads/parallel.h"
@@ -101,16 +102,18 @@ void run(const CLI::App& command, BaselineArguments& arguments) {
   baseline::settle(options);
   const baseline::MethodFacts method = baseline::facts_of(options.method);
   const output::OutputPaths paths = output::output_paths(files.output);
-  const auto check_trace = [&] {
-    check_trace_file(arguments.trace, {paths.volume, paths.json}, options.files, files.overwrite);
+  const auto check_extra_files = [&] {
+    for (const auto& [file, flag] :
+         {std::pair{arguments.trace, "--trace"}, std::pair{arguments.dry_run.grid, "--grid"}})
+      check_extra_file(file, flag, {paths.volume, paths.json}, options.files, files.overwrite);
   };
   if (arguments.dry_run.is_wanted) {
     baseline::check_options(options);
-    check_trace();
+    check_extra_files();
     return rehearse(options, method, arguments.dry_run);
   }
   const std::vector<io::OutputLock> locks = baseline::claim_outputs(options);
-  check_trace();
+  check_extra_files();
   run_traced(arguments.trace, distributed::Communicator::alone(),
              [&] { run_method(options, method, paths); });
 }
@@ -170,7 +173,7 @@ void add_method(CLI::App& baseline, const char* name, const char* help) {
   add_common_options(command);
   add_trace_option(command, arguments->trace);
   add_help_all(command);
-  command.callback([&command, arguments] { run(command, *arguments); });
+  command.callback([&command, arguments] { run_stoppable([&] { run(command, *arguments); }); });
 }
 
 }  // namespace

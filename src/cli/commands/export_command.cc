@@ -171,9 +171,11 @@ void write_compact(const ExportArguments& arguments) {
 void export_volume(const ExportArguments& arguments, const Model& model) {
   const OrientedBox box = exported_box(arguments, model);
   exchange::export_volume(model, box, files_of(arguments));
-  print("{}: {} × {} × {} voxels (x, y, z) of {:.6g} Å about {:.6g}, {:.6g}, {:.6g} px\n",
-        arguments.output.string(), box.size[0], box.size[1], box.size[2],
-        box.voxel_px * model.pixel_size_A, box.centre_px[0], box.centre_px[1], box.centre_px[2]);
+  const bool is_xzy = arguments.choices.options.volume.axes == VolumeAxes::kXzy;
+  print("{}: {} × {} × {} voxels ({}) of {:.6g} Å about {:.6g}, {:.6g}, {:.6g} px\n",
+        arguments.output.string(), box.size[0], box.size[is_xzy ? 2 : 1], box.size[is_xzy ? 1 : 2],
+        is_xzy ? "x, z, y" : "x, y, z", box.voxel_px * model.pixel_size_A, box.centre_px[0],
+        box.centre_px[1], box.centre_px[2]);
 }
 
 // Returns the side of the boxes of particles in voxels, or 0 if it is no whole number.
@@ -323,7 +325,7 @@ void add_export_command(CLI::App& program) {
     compact->excludes(command->get_option(of_volume));
   add_common_options(*command);
   add_help_all(*command);
-  command->callback([arguments] { run_export(*arguments); });
+  command->callback([arguments] { run_stoppable([&] { run_export(*arguments); }); });
 }
 
 }  // namespace tomofield::cli

@@ -77,14 +77,6 @@ void add_plan_option(CLI::App& command, std::optional<std::filesystem::path>& fi
       ->group(kHelpAllGroup);
 }
 
-void check_answer_file(const std::optional<std::filesystem::path>& file, const char* flag,
-                       const options::ReconstructOptions& options) {
-  if (!file) return;
-  io::check_output_files(
-      {*file}, io::input_files(options.files), options.run.overwrite,
-      fmt::format("give another name with {}, or --overwrite to replace it", flag));
-}
-
 void write_plan(const std::filesystem::path& file, const options::ReconstructOptions& options,
                 const distributed::Communicator& processes) {
   processes.run_collectively([&] { reconstruction::check_options(options); });

@@ -14,10 +14,6 @@ namespace tomofield::cli {
 /// Registers --plan.
 void add_plan_option(CLI::App& command, std::optional<std::filesystem::path>& file);
 
-/// Checks that the file of an option such as --plan, if it is given, can be written.
-void check_answer_file(const std::optional<std::filesystem::path>& file, const char* flag,
-                       const options::ReconstructOptions& options);
-
 /// Writes what a run needs as JSON, whether this machine has it or not, for programs that start
 /// runs elsewhere or later (batch).
 void write_plan(const std::filesystem::path& file, const options::ReconstructOptions& options,

@@ -39,17 +39,21 @@ void require_output(RunOptions& run, bool dry_run) {
 
 void run(const CLI::App& command, ReconstructArguments& arguments,
          const distributed::Communicator& processes) {
-  require_output(arguments.choices.options.run, arguments.dry_run.is_wanted);
   processes.run_collectively([&] { open_project(command, arguments.choices); });
+  require_output(arguments.choices.options.run, arguments.dry_run.is_wanted);
   if (arguments.batch_choice)
     note_choice_of_batch(command, *arguments.batch_choice, arguments.choices);
   options::ReconstructOptions options =
       options::run_options(arguments.choices.files, arguments.choices.options);
   processes.run_collectively([&] {
-    check_answer_file(arguments.plan, "--plan", options);
-    check_answer_file(arguments.choice, "--choice", options);
-    check_trace_file(arguments.trace, reconstruction::result_files(options), options.files,
-                     options.run.overwrite);
+    const auto check = [&](const std::optional<std::filesystem::path>& file, const char* flag) {
+      check_extra_file(file, flag, reconstruction::result_files(options), options.files,
+                       options.run.overwrite);
+    };
+    check(arguments.plan, "--plan");
+    check(arguments.choice, "--choice");
+    check(arguments.trace, "--trace");
+    check(arguments.dry_run.grid, "--grid");
   });
   if (arguments.plan) return write_plan(*arguments.plan, options, processes);
   run_traced(arguments.dry_run.is_wanted ? std::nullopt : arguments.trace, processes, [&] {

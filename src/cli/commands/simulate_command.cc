@@ -330,7 +330,7 @@ void add_simulate_command(CLI::App& program) {
   command->add_flag("--no-truth", arguments->without_truth, "Do not write truth.mrc");
   command->add_flag("--overwrite", arguments->overwrite, "Replace files that exist");
   add_common_options(*command);
-  command->callback([arguments] { run_simulate(*arguments); });
+  command->callback([arguments] { run_stoppable([&] { run_simulate(*arguments); }); });
 }
 
 }  // namespace tomofield::cli

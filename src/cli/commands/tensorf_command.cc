@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "base/check.h"
 #include "baseline/neural/tensorf.h"
@@ -47,8 +48,10 @@ void run(const CLI::App& command, TensorfArguments& arguments) {
         *arguments.non_negative ? Activation::kSoftplus : Activation::kIdentity;
   options::ReconstructOptions options = options::run_options(arguments.choices.files, requested);
   const output::OutputPaths paths = output::output_paths(options.run.output);
-  check_trace_file(arguments.trace, {paths.volume, paths.model, paths.json}, options.files,
-                   options.run.overwrite);
+  for (const auto& [file, flag] :
+       {std::pair{arguments.trace, "--trace"}, std::pair{arguments.dry_run.grid, "--grid"}})
+    check_extra_file(file, flag, {paths.volume, paths.model, paths.json}, options.files,
+                     options.run.overwrite);
   base::require_no_faults(options.faults());
   options.field.leaf_size = size_of_node(options);
   run_traced(arguments.dry_run.is_wanted ? std::nullopt : arguments.trace,

@@ -7,6 +7,7 @@
 
 #include "base/threads/parallel.h"
 #include "cli/options/number_checks.h"
+#include "io/saving/output_files.h"
 
 namespace tomofield::cli {
 
@@ -38,6 +39,17 @@ std::vector<option_table::GivenOption> given_options(const CLI::App& command,
       added.value = fmt::format("{}", fmt::join(option->results(), ","));
   }
   return given;
+}
+
+void check_extra_file(const std::optional<std::filesystem::path>& file, const char* flag,
+                      std::vector<std::filesystem::path> results, const SeriesFiles& input,
+                      bool may_replace) {
+  if (!file) return;
+  io::check_output_files(
+      {*file}, io::input_files(input), may_replace,
+      fmt::format("give another name with {}, or --overwrite to replace it", flag));
+  results.push_back(*file);
+  io::check_output_files(results, {}, true, {});
 }
 
 const CLI::App* find_command(const CLI::App& program, const std::vector<std::string>& arguments) {

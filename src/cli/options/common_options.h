@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,6 +44,12 @@ CLI::Option* add_enum_option(CLI::App& command, const std::string& flag, Target&
 /// positional argument has no flag. Several values of one option are joined by commas.
 std::vector<option_table::GivenOption> given_options(const CLI::App& command,
                                                      const std::vector<std::string>& except);
+
+/// Checks a file that an option asks for beside the results of a run, such as --trace. Throws Error
+/// if it is an input or a result, or exists and may not be replaced.
+void check_extra_file(const std::optional<std::filesystem::path>& file, const char* flag,
+                      std::vector<std::filesystem::path> results, const SeriesFiles& input,
+                      bool may_replace);
 
 /// Returns the subcommand that the leading words of the arguments name.
 const CLI::App* find_command(const CLI::App& program, const std::vector<std::string>& arguments);

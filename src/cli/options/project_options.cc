@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "base/log.h"
@@ -15,6 +17,7 @@
 #include "option_table/setting.h"
 #include "option_table/values.h"
 #include "projects/project.h"
+#include "tomofield/error.h"
 
 namespace tomofield::cli {
 namespace {
@@ -41,6 +44,15 @@ std::optional<projects::Project> read_project(const CLI::App& command,
        .has_transfer = choices.options.views.defocus_um || choices.files.ctf});
 }
 
+// Throws Error if the stack is not there. A half of a table of views, "even@TS_01.star", is no
+// file.
+void require_stack(const std::filesystem::path& stack) {
+  std::error_code fault;
+  const bool is_half = stack.string().find('@') != std::string::npos;
+  if (!is_half && !std::filesystem::exists(stack, fault) && !fault)
+    throw Error(fmt::format("'{}' does not exist", stack.string()));
+}
+
 void print_setting(const Setting& setting, std::string_view remark) {
   print("{} {} from {}: {}{}\n", setting.option, setting.value, setting.file.string(),
         setting.entry, remark);
@@ -53,7 +65,7 @@ std::vector<Setting> settings_for(const CLI::App& command, const projects::Proje
     if (command.get_option_no_throw(setting.option) != nullptr)
       settings.push_back(setting);
     else
-      print_setting(setting, " (not an option of this command)");
+      print_setting(setting, " (for reconstruct)");
   }
   return settings;
 }
@@ -70,6 +82,7 @@ void add_project_options(CLI::App& command) {
 }
 
 void open_project(const CLI::App& command, option_table::Choices& choices) {
+  require_stack(choices.files.stack);
   choices.options.given = given_flags(command);
   const std::optional<projects::Project> project = read_project(command, choices);
   if (!project) return;

@@ -9,7 +9,6 @@
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
 #include "io/saving/atomic_file.h"
-#include "io/saving/output_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
@@ -43,15 +42,6 @@ void add_trace_option(CLI::App& command, std::optional<fs::path>& file) {
           "chrome://tracing or ui.perfetto.dev")
       ->type_name("FILE.json")
       ->group(kHelpAllGroup);
-}
-
-void check_trace_file(const std::optional<fs::path>& file, std::vector<fs::path> results,
-                      const SeriesFiles& input, bool may_replace) {
-  if (!file) return;
-  io::check_output_files({*file}, io::input_files(input), may_replace,
-                         "give another name with --trace, or --overwrite to replace it");
-  results.push_back(*file);
-  io::check_output_files(results, {}, true, {});
 }
 
 void run_traced(const std::optional<fs::path>& file, const distributed::Communicator& processes,

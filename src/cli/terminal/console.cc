@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 
+#include "base/progress.h"
 #include "io/saving/scratch_memory.h"
 
 namespace tomofield::cli {
@@ -69,7 +70,21 @@ void say_text(std::string_view text) {
 void stop_on_signals(bool is_job) {
   std::signal(SIGINT, remember_signal);
   std::signal(SIGTERM, remember_signal);
+  if (std::signal(SIGHUP, remember_signal) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);  // by nohup
   if (is_job) std::signal(SIGUSR1, remember_signal);
+}
+
+void run_stoppable(const std::function<void()>& run) {
+  stop_on_signals();
+  base::set_interruption([] {
+    if (stop_was_requested()) throw base::StopRequested{};
+  });
+  try {
+    run();
+  } catch (const base::StopRequested&) {
+    throw ExitStatus{stop_status(),
+                     "stopped; nothing was written, and old results are as they were"};
+  }
 }
 
 bool stop_was_requested() { return g_signal != 0; }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <functional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -63,9 +64,14 @@ class ExitStatus : public std::runtime_error {
   int status_;
 };
 
-/// Lets Ctrl-C (SIGINT) and SIGTERM ask the program to stop instead of ending it. In a job of
-/// several processes SIGUSR1 asks for it too, because mpirun passes it on without a time limit.
+/// Lets Ctrl-C (SIGINT), SIGTERM and the end of the terminal (SIGHUP) ask the program to stop
+/// instead of ending it. In a job of several processes SIGUSR1 asks for it too, because mpirun
+/// passes it on without a time limit.
 void stop_on_signals(bool is_job = false);
+
+/// Does work that has no checkpoints. Ctrl-C and SIGTERM end it with an ExitStatus, and it leaves
+/// no files of its own behind.
+void run_stoppable(const std::function<void()>& run);
 
 /// Returns true if one of these signals has come.
 bool stop_was_requested();

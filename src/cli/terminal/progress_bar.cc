@@ -65,6 +65,7 @@ base::ProgressSink make_progress_bar(const std::string& title) {
   const bool terminal = isatty(STDERR_FILENO) == 1;
   auto display = std::make_shared<Display>();
   return [=](const base::ProgressReport& report) {
+    base::allow_interruption();
     const bool is_whole = report.fraction_done >= 1.0;
     const bool has_just_ended = is_whole && !display->was_whole;
     const double pause = terminal ? kSecondsBetweenDraws : kSecondsBetweenLines;

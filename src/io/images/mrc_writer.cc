@@ -10,12 +10,13 @@
 #include <system_error>
 
 #include "base/check.h"
-#include "base/log.h"
 #include "base/plausible.h"
+#include "base/progress.h"
 #include "base/system/memory.h"
 #include "io/images/mrc.h"
 #include "io/images/mrc_format.h"
 #include "io/saving/atomic_file.h"
+#include "io/saving/output_target.h"
 #include "io/saving/positioned_file.h"
 #include "tomofield/error.h"
 
@@ -58,26 +59,6 @@ MrcHeader header_of(const MrcSpec& spec, const std::string& name) {
   header.sections_a_volume = spec.sections_a_volume;
   header.labels = spec.labels;
   return header;
-}
-
-constexpr double kGibibyte = 1 << 30;
-
-// Throws Error if the disk has less room than a file needs. Some disks that have room say that they
-// have none at all, and are written with a warning.
-void require_room(const std::filesystem::path& folder, const std::filesystem::path& path,
-                  std::int64_t bytes) {
-  std::error_code error;
-  const auto space = std::filesystem::space(folder, error);
-  if (error || space.available >= static_cast<std::uintmax_t>(bytes)) return;
-  if (space.available == 0) {
-    return base::log_warning(
-        fmt::format("'{}' will have {} bytes, but its disk has only 0 left", path.string(), bytes));
-  }
-  throw Error(fmt::format(
-      "cannot write '{}': it will have {} bytes ({:.4g} GiB), and its disk has only {:.4g} GiB "
-      "left: free some space there, write to another folder, or make a smaller volume",
-      path.string(), bytes, static_cast<double>(bytes) / kGibibyte,
-      static_cast<double>(space.available) / kGibibyte));
 }
 
 // Returns room for the moments of all rows. Throws Error if it is more than the memory.
@@ -189,6 +170,7 @@ void MrcWriter::write_sections(std::int64_t first, std::span<const float> values
 
 void MrcWriter::write_rows(std::int64_t section, std::int64_t first_row, std::int64_t num_rows,
                            std::span<const float> values) {
+  base::allow_interruption();
   const MrcHeader& header = impl_->header;
   TOMOFIELD_CHECK(
       section >= 0 && section < header.nz && first_row >= 0 && num_rows >= 0 &&

@@ -8,8 +8,11 @@
 #include <system_error>
 #include <vector>
 
+#include "base/progress.h"
 #include "io/images/mrc.h"
+#include "io/images/mrc_format.h"
 #include "io/images/zarr_array.h"
+#include "io/is_file.h"
 #include "io/saving/atomic_folder.h"
 #include "io/saving/positioned_file.h"
 #include "tomofield/error.h"
@@ -29,6 +32,7 @@ void for_chunks(const ZarrArray& array, const Write& write) {
     const std::int64_t sections =
         std::min(ZarrArray::kSide, array.size()[2] - z * ZarrArray::kSide);
     for (std::int64_t y = 0; y < array.num_chunks(1); ++y) {
+      base::allow_interruption();
       const std::int64_t rows = std::min(ZarrArray::kSide, array.size()[1] - y * ZarrArray::kSide);
       values.assign(static_cast<std::size_t>(sections * rows * array.size()[0]), 0.0f);
       write(z, y, sections, rows, values);
@@ -92,6 +96,11 @@ void average_pairs(const ZarrArray& finer, const ZarrArray& array) {
   });
 }
 
+Size halved(Size size) {
+  for (std::int64_t& side : size) side = (side + 1) / 2;
+  return size;
+}
+
 // Describes one array: the side of its voxels, and the middle of its first voxel as that of array
 // "0" has it, which is at the ORIGIN.
 nlohmann::json dataset(int level, const MrcHeader& volume) {
@@ -140,24 +149,53 @@ void write_group(const std::filesystem::path& root, nlohmann::json scales, ZarrV
   write_text(root / ".zgroup", {{"zarr_format", 2}});
 }
 
-// Says whether write_ome_zarr() gives this name to a file or a folder of a store.
-bool is_own_name(const std::string& name) {
-  constexpr std::array<const char*, 4> kFiles{kZarrMarker, ".zattrs", ".zgroup", "zarr.json"};
-  return std::ranges::find(kFiles, name) != kFiles.end() ||
-         std::ranges::all_of(name, [](char c) { return c >= '0' && c <= '9'; });
+bool is_number(const std::string& name) {
+  return std::ranges::all_of(name, [](char c) { return c >= '0' && c <= '9'; });
+}
+
+// Says whether write_ome_zarr() gives this name to a file (or else a folder) at a depth of a store.
+// Levels are folders "0", "1", … of the top; chunks are numbers below them, or below "c".
+bool is_own_name(const std::string& name, bool is_plain, int depth) {
+  constexpr std::array<const char*, 4> kOfTop{kZarrMarker, ".zattrs", ".zgroup", "zarr.json"};
+  constexpr std::array<const char*, 2> kOfLevel{".zarray", "zarr.json"};
+  if (is_plain && depth == 0) return std::ranges::find(kOfTop, name) != kOfTop.end();
+  if (is_plain && depth == 1 && std::ranges::find(kOfLevel, name) != kOfLevel.end()) return true;
+  return is_number(name) || (!is_plain && depth == 1 && name == "c");
+}
+
+// Says whether a folder of the top is a level: it has the description of an array.
+bool is_level(const std::filesystem::path& folder) {
+  return is_file(folder / ".zarray") || is_file(folder / "zarr.json");
 }
 
 }  // namespace
 
+base::CheckedSize ome_zarr_bytes(Size size, MrcMode mode) {
+  base::CheckedSize bytes(0);
+  for (;; size = halved(size)) {
+    base::CheckedSize of_level(static_cast<std::int64_t>(bytes_per_value(mode)));
+    for (const std::int64_t side : size)
+      of_level = of_level * ((side + ZarrArray::kSide - 1) / ZarrArray::kSide * ZarrArray::kSide);
+    bytes = bytes + of_level;
+    if (std::ranges::max(size) <= ZarrArray::kSide) return bytes;
+  }
+}
+
 void require_replaceable_zarr(const std::filesystem::path& path) {
   require_replaceable_folder(path, kZarrMarker);
   std::error_code absent;
-  for (const auto& entry : std::filesystem::directory_iterator(path, absent)) {
-    if (is_own_name(entry.path().filename().string())) continue;
+  std::filesystem::recursive_directory_iterator entries(path, absent), end;
+  for (; !absent && entries != end; entries.increment(absent)) {
+    const bool is_folder = entries->is_directory() && !entries->is_symlink();
+    const bool is_own =
+        !entries->is_symlink() &&
+        is_own_name(entries->path().filename().string(), !is_folder, entries.depth()) &&
+        (!is_folder || entries.depth() > 0 || is_level(entries->path()));
+    if (is_own) continue;
     throw Error(
         fmt::format("cannot replace '{}': it has '{}', which tomofield has not made; move one of "
                     "them away, or give another name",
-                    path.string(), entry.path().filename().string()));
+                    path.string(), entries->path().lexically_relative(path).string()));
   }
 }
 
@@ -172,9 +210,8 @@ void write_ome_zarr(const std::filesystem::path& mrc, const std::filesystem::pat
   arrays.emplace_back(root / "0", Size{header.nx, header.ny, header.nz}, header.mode, version);
   copy_volume(volume, arrays.back());
   while (std::ranges::max(arrays.back().size()) > ZarrArray::kSide) {
-    Size half = arrays.back().size();
-    for (std::int64_t& side : half) side = (side + 1) / 2;
-    ZarrArray coarser(root / std::to_string(arrays.size()), half, header.mode, version);
+    ZarrArray coarser(root / std::to_string(arrays.size()), halved(arrays.back().size()),
+                      header.mode, version);
     average_pairs(arrays.back(), coarser);
     arrays.push_back(std::move(coarser));
   }

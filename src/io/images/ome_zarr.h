@@ -1,8 +1,12 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
+#include "base/plausible.h"
+#include "io/images/mrc.h"
 #include "tomofield/options.h"
 
 namespace tomofield::io {
@@ -10,6 +14,10 @@ namespace tomofield::io {
 /// The file by which a folder is known as a store that this program made; only such a folder is
 /// replaced.
 inline constexpr const char* kZarrMarker = ".tomofield";
+
+/// Returns the bytes of the arrays of a store: whole chunks, also where a volume ends in one.
+/// `size` is (x, y, z).
+base::CheckedSize ome_zarr_bytes(std::array<std::int64_t, 3> size, MrcMode mode);
 
 /// Throws Error if something is at `path` that write_ome_zarr() must not replace: anything but a
 /// store that this program made, or such a store with something that others put into it, such as

@@ -37,11 +37,12 @@ int keep_first_message(TIFF*, void* user_data, const char*, const char* format, 
 
 int drop_message(TIFF*, void*, const char*, const char*, va_list) { return 1; }
 
-// Describes the size of a page and the type of its values.
+// Describes the size of a page, the size of its pixels in Å (0: unknown), and its values.
 struct PageFormat {
   std::uint32_t width = 0, height = 0;
   std::uint16_t bits = 1, samples = 1, kind = SAMPLEFORMAT_UINT;
-  std::uint16_t photometric = PHOTOMETRIC_MINISBLACK;
+  std::uint16_t photometric = PHOTOMETRIC_MINISBLACK, orientation = ORIENTATION_TOPLEFT;
+  double pixel_width_A = 0, pixel_height_A = 0;
   bool is_tiled = false;
 
   bool operator==(const PageFormat&) const = default;
@@ -87,24 +88,37 @@ class TiffFile {
     TIFFGetFieldDefaulted(handle_, TIFFTAG_SAMPLESPERPIXEL, &format.samples);
     TIFFGetFieldDefaulted(handle_, TIFFTAG_SAMPLEFORMAT, &format.kind);
     TIFFGetField(handle_, TIFFTAG_PHOTOMETRIC, &format.photometric);
+    TIFFGetFieldDefaulted(handle_, TIFFTAG_ORIENTATION, &format.orientation);
     format.is_tiled = TIFFIsTiled(handle_) != 0;
+    read_pixel_size(format);
     require_readable(format, page);
     return format;
   }
 
-  // Returns the size of a pixel in Å by the resolution tags, or 0.
-  double pixel_size_A() const {
-    float per_unit = 0;
+ private:
+  // Reads the size of a pixel from the resolution tags. A size that no image of a microscope has
+  // is that of a printer, which has 72 to 2400 dots an inch.
+  void read_pixel_size(PageFormat& format) const {
+    float across = 0, down = 0;
     std::uint16_t unit = RESUNIT_NONE;
-    TIFFGetField(handle_, TIFFTAG_XRESOLUTION, &per_unit);
+    TIFFGetField(handle_, TIFFTAG_XRESOLUTION, &across);
+    TIFFGetField(handle_, TIFFTAG_YRESOLUTION, &down);
     TIFFGetFieldDefaulted(handle_, TIFFTAG_RESOLUTIONUNIT, &unit);
     const double unit_A = unit == RESUNIT_CENTIMETER ? 1e8 : unit == RESUNIT_INCH ? 2.54e8 : 0.0;
-    constexpr double kSmallest_A = 0.05, kLargest_A = 1000;  // printers have 72 to 2400 an inch
-    const double size_A = per_unit > 0 ? unit_A / static_cast<double>(per_unit) : 0.0;
-    return size_A >= kSmallest_A && size_A <= kLargest_A ? size_A : 0.0;
+    constexpr double kSmallest_A = 0.05, kLargest_A = 1000;
+    const auto size_A = [&](float per_unit) {
+      return per_unit > 0 ? unit_A / static_cast<double>(per_unit) : 0.0;
+    };
+    const auto is_plausible = [&](double size) {
+      return size >= kSmallest_A && size <= kLargest_A;
+    };
+    const double width_A = size_A(across > 0 ? across : down);
+    const double height_A = size_A(down > 0 ? down : across);
+    if (!is_plausible(width_A) && !is_plausible(height_A)) return;
+    format.pixel_width_A = width_A;
+    format.pixel_height_A = height_A;
   }
 
- private:
   void require_readable(const PageFormat& format, std::size_t page) const {
     if (format.width < 1 || format.height < 1 || format.width > kLargestSide ||
         format.height > kLargestSide || format.bytes() > most_bytes()) {
@@ -116,6 +130,12 @@ class TiffFile {
     const bool is_integer = format.kind == SAMPLEFORMAT_UINT || format.kind == SAMPLEFORMAT_INT;
     const bool is_float = format.kind == SAMPLEFORMAT_IEEEFP && format.bits == 32;
     const bool has_bits = format.bits == 8 || format.bits == 16 || format.bits == 32;
+    if (format.orientation != ORIENTATION_TOPLEFT && format.orientation != ORIENTATION_BOTLEFT) {
+      fail(fmt::format(
+          "says that page {} is mirrored or turned (Orientation {}), which is not read: "
+          "convert it to Orientation 1",
+          page + 1, format.orientation));
+    }
     if (format.samples == 1 && ((is_integer && has_bits) || is_float))
       return require_grey(format, page);
     fail(fmt::format(
@@ -194,8 +214,11 @@ class PageReader {
  private:
   std::size_t bytes_per_value() const { return format_.bits / 8; }
 
-  float* row(std::uint32_t from_top) const {
-    return out_.data() + static_cast<std::size_t>(format_.height - 1 - from_top) * format_.width;
+  // Returns a row by its number in the file, which begins with the top one or with the bottom one.
+  float* row(std::uint32_t number) const {
+    const bool is_bottom_first = format_.orientation == ORIENTATION_BOTLEFT;
+    const std::uint32_t from_bottom = is_bottom_first ? number : format_.height - 1 - number;
+    return out_.data() + static_cast<std::size_t>(from_bottom) * format_.width;
   }
 
   std::vector<std::byte> buffer(tmsize_t bytes) const {
@@ -251,16 +274,10 @@ class TiffStack : public ImageStack {
   explicit TiffStack(std::filesystem::path path) : path_(std::move(path)) {
     const TiffFile file(path_);
     format_ = file.format(0);
-    header_.voxel_size_A.fill(file.pixel_size_A());
+    header_.voxel_size_A = {format_.pixel_width_A, format_.pixel_height_A, format_.pixel_width_A};
     do {
       const PageFormat of_page = file.format(pages_.size());
-      if (of_page != format_) {
-        file.fail(
-            fmt::format("has pages of several kinds: page {} has {} × {} pixels of {} bits, "
-                        "and the first {} × {} of {}",
-                        pages_.size() + 1, of_page.width, of_page.height, of_page.bits,
-                        format_.width, format_.height, format_.bits));
-      }
+      if (of_page != format_) refuse(file, of_page);
       pages_.push_back(TIFFCurrentDirOffset(file.handle()));
       if (pages_.size() > kMostPages) file.fail("has more pages than any tilt series");
     } while (TIFFReadDirectory(file.handle()) != 0);
@@ -284,6 +301,19 @@ class TiffStack : public ImageStack {
   }
 
  private:
+  // Refuses a page that is of another kind than the first.
+  [[noreturn]] void refuse(const TiffFile& file, const PageFormat& page) const {
+    const auto kind = [](const PageFormat& of) {
+      return fmt::format(
+          "{} × {} pixels of {} bits and {:.4g} × {:.4g} Å (photometric {}, "
+          "orientation {})",
+          of.width, of.height, of.bits, of.pixel_width_A, of.pixel_height_A, of.photometric,
+          of.orientation);
+    };
+    file.fail(fmt::format("has pages of several kinds: page {} has {}, and the first {}",
+                          pages_.size() + 1, kind(page), kind(format_)));
+  }
+
   std::filesystem::path path_;
   PageFormat format_;
   std::vector<std::uint64_t> pages_;  // places of their directories in the file

@@ -57,7 +57,7 @@ void check_output_files(const std::vector<fs::path>& results, const std::vector<
   require_distinct(results);
   require_no_input_is_replaced(results, inputs);
   for (const fs::path& result : results) {
-    if (!may_replace && fs::exists(result))
+    if (!may_replace && fs::is_regular_file(result))
       throw Error(fmt::format("'{}' exists: {}", result.string(), advice));
     require_writable(result);
   }

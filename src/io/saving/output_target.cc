@@ -14,6 +14,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "base/log.h"
 #include "io/saving/file_identity.h"
 #include "tomofield/error.h"
 
@@ -105,6 +106,22 @@ void remove_abandoned(const fs::path& target) {
         is_temporary_suffix(std::string_view(name).substr(prefix.size())))
       ::unlink(it->path().c_str());
   }
+}
+
+void require_room(const fs::path& folder, const fs::path& path, std::int64_t bytes) {
+  constexpr double kGibibyte = 1 << 30;
+  std::error_code error;
+  const auto space = fs::space(folder, error);
+  if (error || space.available >= static_cast<std::uintmax_t>(bytes)) return;
+  if (space.available == 0) {
+    return base::log_warning(
+        fmt::format("'{}' will have {} bytes, but its disk has only 0 left", path.string(), bytes));
+  }
+  throw Error(fmt::format(
+      "cannot write '{}': it will have {} bytes ({:.4g} GiB), and its disk has only {:.4g} GiB "
+      "left: free some space there, write to another folder, or make a smaller volume",
+      path.string(), bytes, static_cast<double>(bytes) / kGibibyte,
+      static_cast<double>(space.available) / kGibibyte));
 }
 
 void require_writable(const fs::path& path) {

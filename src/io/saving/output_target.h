@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -28,6 +29,11 @@ std::filesystem::path unused_temporary_name(const std::filesystem::path& target)
 /// Removes all temporary files of `target`. The caller has the lock of `target` (OutputLock), so
 /// that no other process uses them: they are from processes that were killed.
 void remove_abandoned(const std::filesystem::path& target);
+
+/// Throws Error if the disk of a folder has less room than the results called `path` need. Some
+/// disks that have room say that they have none at all, and are written with a warning.
+void require_room(const std::filesystem::path& folder, const std::filesystem::path& path,
+                  std::int64_t bytes);
 
 /// Throws Error unless `path` can be written or replaced. Leaves nothing behind.
 void require_writable(const std::filesystem::path& path);

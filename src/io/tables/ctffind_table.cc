@@ -23,16 +23,22 @@ constexpr double kRadians = std::numbers::pi / 180.0;
 constexpr std::int64_t kMostSections = 100000;
 
 // Returns the number that follows a key of a comment, as in "acceleration voltage: 300.0 keV".
-std::optional<double> number_after(std::string_view text, std::string_view key) {
+// Returns nothing without the key. Throws Error if no number follows it.
+std::optional<double> number_after(const std::filesystem::path& path, const TextLine& line,
+                                   std::string_view key) {
+  const std::string_view text = line.text;
   const std::size_t at = text.find(key);
   if (at == std::string_view::npos) return std::nullopt;
   const auto words = split_words(text.substr(at + key.size()));
-  return words.empty() ? std::nullopt : parse_number(words.front());
+  const auto number = words.empty() ? std::nullopt : parse_number(words.front());
+  if (number) return *number;
+  throw Error(
+      fmt::format("'{}', line {}: no number follows '{}'", path.string(), line.number, key));
 }
 
-void read_comment(std::string_view text, StatedOptics& optics) {
+void read_comment(const std::filesystem::path& path, const TextLine& line, StatedOptics& optics) {
   const auto take = [&](std::string_view key, std::optional<double>& value) {
-    if (const auto number = number_after(text, key)) value = number;
+    if (const auto number = number_after(path, line, key)) value = number;
   };
   take("acceleration voltage:", optics.voltage_kV);
   take("spherical aberration:", optics.spherical_aberration_mm);
@@ -72,7 +78,7 @@ CtfTable read_ctffind(const std::filesystem::path& path) {
   CtfTable table{path, {}, {}, {}};
   for (const TextLine& line : read_text_lines(path)) {
     if (line.text.starts_with('#')) {
-      read_comment(line.text, table.optics);
+      read_comment(path, line, table.optics);
       continue;
     }
     const Row row = parse_row(path, line);

@@ -64,13 +64,16 @@ void choose_axis(const StatedAxes& axes, Mdoc& mdoc) {
 
 constexpr double kLargestDefocus_um = 1000;
 
-// Returns a voltage that a microscope can have, or nothing. SerialEM writes 0 or -1 if it does not
-// know it.
-std::optional<double> parse_voltage_kV(std::string_view text) {
+// Returns a voltage, or nothing for 0 or -1, which SerialEM writes if it does not know it. Throws
+// Error for one that no microscope has.
+std::optional<double> parse_voltage_kV(const std::filesystem::path& path, const TextLine& line,
+                                       std::string_view word) {
   constexpr double kLowest_kV = 20, kHighest_kV = 3000;
-  const auto voltage_kV = parse_number(text);
-  if (!voltage_kV || *voltage_kV < kLowest_kV || *voltage_kV > kHighest_kV) return std::nullopt;
-  return voltage_kV;
+  const double voltage_kV = require_number(path, line, word, base::kLargestNumber);
+  if (voltage_kV == 0.0 || voltage_kV == -1.0) return std::nullopt;
+  if (voltage_kV >= kLowest_kV && voltage_kV <= kHighest_kV) return voltage_kV;
+  throw Error(fmt::format("'{}', line {}: no microscope has a voltage of {} kV", path.string(),
+                          line.number, voltage_kV));
 }
 
 // Reads two whole numbers, as of ImageSize.
@@ -224,7 +227,7 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
       const double axis_deg = require_number(path, line, entry.value, base::kLargestAngle_deg);
       if (!axes.entry) axes.entry = AxisAngle{axis_deg, line.number};
     } else if (entry.key == "Voltage" && !mdoc.voltage_kV) {
-      mdoc.voltage_kV = parse_voltage_kV(entry.value);
+      mdoc.voltage_kV = parse_voltage_kV(path, line, entry.value);
     } else if (is_in_section) {
       read_section_entry(path, line, entry, &mdoc.sections.back());
     } else if (entry.key == "ImageFile") {
