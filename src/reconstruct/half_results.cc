@@ -16,6 +16,7 @@
 #include "output/output_paths.h"
 #include "output/volume.h"
 #include "reconstruct/halves.h"
+#include "reconstruct/results.h"
 #include "reconstruct/run_files.h"
 #include "reconstruct/run_pages.h"
 #include "report/choice_plot.h"
@@ -162,16 +163,11 @@ void log_halves(const Run& run, const evaluate::Fsc& fsc) {
 
 // Throws the exception that is being handled, and says that the fits are not lost.
 [[noreturn]] void say_that_models_are_kept(const Run& run) {
-  const std::string advice = fmt::format(
+  throw_with(fmt::format(
       "; the finished fits are kept in '{}', '{}' and '{}': the same command with --resume writes "
       "the results",
       run.paths.model.string(), paths_of(run, Half::kEven).model.string(),
-      paths_of(run, Half::kOdd).model.string());
-  try {
-    throw;
-  } catch (const Error& error) {
-    throw Error(error.what() + advice);
-  }
+      paths_of(run, Half::kOdd).model.string()));
 }
 
 void write_all(const Run& run, const FinishedFits& fits, const std::optional<tune::TunedFit>& tuned,

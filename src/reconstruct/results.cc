@@ -131,16 +131,9 @@ void write_results(RunResult& results, const ResultFiles& files) {
   } catch (const Error&) {  // the first failure says more
   }
   if (!is_kept) throw;
-  const std::string advice = fmt::format(
+  throw_with(fmt::format(
       "; the finished fit is kept in '{}': the same command with --resume writes the results",
-      model.string());
-  try {
-    throw;
-  } catch (const distributed::SharedError& error) {
-    throw distributed::SharedError(error.what() + advice);
-  } catch (const Error& error) {
-    throw Error(error.what() + advice);
-  }
+      model.string()));
 }
 
 // Does the same for a compact model, which is no checkpoint.
@@ -151,14 +144,8 @@ void write_results(RunResult& results, const ResultFiles& files) {
   } catch (const Error&) {  // the first failure says more
   }
   if (!is_kept) throw;
-  try {
-    throw;
-  } catch (const Error& error) {
-    throw Error(
-        fmt::format("{}; the compact model is kept in '{}': tomofield export writes its "
-                    "volume",
-                    error.what(), model.string()));
-  }
+  throw_with(fmt::format("; the compact model is kept in '{}': tomofield export writes its volume",
+                         model.string()));
 }
 
 // Replaces the model of the results by a compact one.
@@ -186,6 +173,16 @@ void make_compact_or_keep(const ResultFiles& files, std::optional<io::OutputSet>
 }
 
 }  // namespace
+
+void throw_with(const std::string& advice) {
+  try {
+    throw;
+  } catch (const distributed::SharedError& error) {
+    throw distributed::SharedError(error.what() + advice);
+  } catch (const Error& error) {
+    throw Error(error.what() + advice);
+  }
+}
 
 record::FitRecord examine(const fit::Fit& fit, const measurement::Measurement& measured,
                           const Run& run, const FitOutcome& outcome) {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "checkpoint/checkpoint.h"
@@ -55,6 +56,9 @@ struct ResultFiles {
   const output::VolumeShare& share;
   const std::optional<measurement::PredictedView>& held_out_view;
 };
+
+/// Throws the exception that is being handled, an Error, with advice at the end of its sentence.
+[[noreturn]] void throw_with(const std::string& advice);
 
 /// Writes the volume, the model, the metrics, pictures, files for other programs and the report of
 /// a run. All files appear together. If one cannot be written, the model alone appears, and Error
