@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "compact/budget.h"
 #include "fit/constants.h"
@@ -59,6 +62,102 @@ bool may_learn(const Options& options) {
 
 constexpr double kLeastFactor = 0.05, kMostFactor = 20;
 
+// The sentences on options that do not go together.
+class Faults {
+ public:
+  void refuse_if(bool is_fault, const char* sentence) {
+    if (is_fault) sentences_.emplace_back(sentence);
+  }
+  // Adds what a function throws.
+  template <typename Check>
+  void refuse_what_throws(const char* flag, const Check& check) {
+    try {
+      check();
+    } catch (const Error& error) {
+      sentences_.push_back(std::string(flag) + error.what());
+    }
+  }
+  std::vector<std::string> sentences() && { return std::move(sentences_); }
+
+ private:
+  std::vector<std::string> sentences_;
+};
+
+std::vector<std::string> faults_of_field(const ReconstructOptions& options) {
+  const FieldOptions& field = options.field;
+  const FitOptions& fit = options.fit;
+  Faults faults;
+  faults.refuse_if(
+      field.tree == TreeKind::kAdaptive && !fit::can_solve_integer_programs(),
+      "--tree adaptive needs COIN-OR CBC, and this tomofield was built without it: take "
+      "--tree uniform, or build tomofield with -DTOMOFIELD_WITH_CBC=ON");
+  faults.refuse_if(field.leaf_budget > 0 && field.tree == TreeKind::kUniform,
+                   "--leaf-budget is for --tree adaptive alone");
+  faults.refuse_if(
+      fit.vertex_epochs > 0 && fit.engine == Engine::kRay,
+      "--vertex-epochs needs --engine slab: with rays factors are fitted from the start");
+  faults.refuse_if(
+      fit.vertex_epochs > 0 && (field.kind != FieldKind::kVm || field.tree != TreeKind::kUniform),
+      "--vertex-epochs is for the factors of a uniform tree: leave it out, or give --field "
+      "vm and --tree uniform");
+  return std::move(faults).sentences();
+}
+
+std::vector<std::string> faults_of_fit(const ReconstructOptions& options) {
+  const FitOptions& fit = options.fit;
+  const bool is_ray = fit.engine == Engine::kRay;
+  Faults faults;
+  faults.refuse_if(
+      fit.coarse_bin > 0 && !std::has_single_bit(static_cast<unsigned>(fit.coarse_bin)),
+      "--coarse-bin is the largest of binnings that are halved from stage to stage: give a "
+      "power of two, such as 2, 4 or 8");
+  faults.refuse_what_throws("", [&] { denoise_factor(fit.denoise); });
+  faults.refuse_if(
+      fit.prior != Prior::kTv && !may_learn(options),
+      "--prior learned works on plain vertices a pixel apart: it needs --field grid, --tree "
+      "uniform, --vertex-spacing 1 and --engine slab, and no --budget");
+  faults.refuse_if(fit.density_variation == 0.0 && !options.chooses_weight() &&
+                       fit.denoise != FitOptions().denoise,
+                   "--denoise multiplies the weight of total variation, and --tv 0 turns that off: "
+                   "leave one of them out");
+  faults.refuse_if(
+      fit.patience > 0 && fit.hold_out == 0,
+      "--early-stop watches views that --hold-out keeps from the fit: give that as well");
+  faults.refuse_if(fit.hold_out > 0 && is_ray,
+                   "--hold-out predicts aligned views: it needs --engine slab");
+  faults.refuse_if(fit.tune && is_ray, "--tune predicts aligned views: it needs --engine slab");
+  faults.refuse_if(fit.tune && fit.patience > 0,
+                   "--tune chooses the number of epochs: leave --early-stop out");
+  return std::move(faults).sentences();
+}
+
+std::vector<std::string> faults_of_run(const ReconstructOptions& options) {
+  const RunOptions& run = options.run;
+  Faults faults;
+  faults.refuse_if(run.resume && run.overwrite,
+                   "--resume continues a run and --overwrite starts it over: give one of them");
+  faults.refuse_if(run.resume && run.output.empty(),
+                   "--resume continues from the files of an interrupted run: give their output");
+  faults.refuse_if(run.align != Alignment::kOff && options.fit.engine == Engine::kRay,
+                   "--align refine aligns views in their plane: it needs --engine slab");
+  return std::move(faults).sentences();
+}
+
+std::vector<std::string> faults_of_budget(const ReconstructOptions& options) {
+  const FieldOptions& field = options.field;
+  Faults faults;
+  if (!field.budget.empty()) {
+    faults.refuse_what_throws("--budget ", [&] { compact::parse_budget(field.budget); });
+    faults.refuse_if(field.kind != FieldKind::kGrid,
+                     "--budget makes plain vertices compact: give --field grid");
+    faults.refuse_if(options.makes_halves(),
+                     "--budget is for one fit, and halves need three: leave it out");
+  }
+  faults.refuse_if(field.tile_rows.value_or(0) > 0 && field.budget.empty(),
+                   "--tile-rows fits tiles that are made compact: give --budget as well");
+  return std::move(faults).sentences();
+}
+
 }  // namespace
 
 Options resolve(const SeriesFiles& files, const Options& requested) {
@@ -112,64 +211,14 @@ int ReconstructOptions::num_trials(int num_fitted_views,
 
 std::vector<std::string> ReconstructOptions::faults() const {
   std::vector<std::string> all = option_table::range_faults(*this);
-  for (std::string& fault : output::faults_of(volume)) all.push_back(std::move(fault));
-  const auto refuse_if = [&](bool is_fault, const char* sentence) {
-    if (is_fault) all.emplace_back(sentence);
-  };
-  const bool is_ray = fit.engine == Engine::kRay;
-  refuse_if(fit.coarse_bin > 0 && !std::has_single_bit(static_cast<unsigned>(fit.coarse_bin)),
-            "--coarse-bin is the largest of binnings that are halved from stage to stage: give a "
-            "power of two, such as 2, 4 or 8");
-  refuse_if(field.tree == TreeKind::kAdaptive && !fit::can_solve_integer_programs(),
-            "--tree adaptive needs COIN-OR CBC, and this tomofield was built without it: take "
-            "--tree uniform, or build tomofield with -DTOMOFIELD_WITH_CBC=ON");
-  refuse_if(field.leaf_budget > 0 && field.tree == TreeKind::kUniform,
-            "--leaf-budget is for --tree adaptive alone");
-  refuse_if(fit.vertex_epochs > 0 && is_ray,
-            "--vertex-epochs needs --engine slab: with rays factors are fitted from the start");
-  refuse_if(
-      fit.vertex_epochs > 0 && (field.kind != FieldKind::kVm || field.tree != TreeKind::kUniform),
-      "--vertex-epochs is for the factors of a uniform tree: leave it out, or give --field "
-      "vm and --tree uniform");
-  try {
-    denoise_factor(fit.denoise);
-  } catch (const Error& error) {
-    all.emplace_back(error.what());
-  }
-  refuse_if(fit.prior != Prior::kTv && !may_learn(*this),
-            "--prior learned works on plain vertices a pixel apart: it needs --field grid, --tree "
-            "uniform, --vertex-spacing 1 and --engine slab, and no --budget");
-  refuse_if(
-      fit.density_variation == 0.0 && !chooses_weight() && fit.denoise != FitOptions().denoise,
-      "--denoise multiplies the weight of total variation, and --tv 0 turns that off: leave "
-      "one of them out");
-  refuse_if(fit.patience > 0 && fit.hold_out == 0,
-            "--early-stop watches views that --hold-out keeps from the fit: give that as well");
-  refuse_if(fit.hold_out > 0 && is_ray,
-            "--hold-out predicts aligned views: it needs --engine slab");
-  refuse_if(fit.tune && is_ray, "--tune predicts aligned views: it needs --engine slab");
-  refuse_if(fit.tune && fit.patience > 0,
-            "--tune chooses the number of epochs: leave --early-stop out");
-  refuse_if(run.resume && run.overwrite,
-            "--resume continues a run and --overwrite starts it over: give one of them");
-  refuse_if(run.resume && run.output.empty(),
-            "--resume continues from the files of an interrupted run: give their output");
-  refuse_if(run.align != Alignment::kOff && is_ray,
-            "--align refine aligns views in their plane: it needs --engine slab");
-  if (!field.budget.empty()) {
-    try {
-      compact::parse_budget(field.budget);
-    } catch (const Error& error) {
-      all.push_back(fmt::format("--budget {}", error.what()));
-    }
-    refuse_if(field.kind != FieldKind::kGrid,
-              "--budget makes plain vertices compact: give --field grid");
-    refuse_if(makes_halves(), "--budget is for one fit, and halves need three: leave it out");
-  }
-  refuse_if(field.tile_rows.value_or(0) > 0 && field.budget.empty(),
-            "--tile-rows fits tiles that are made compact: give --budget as well");
-  for (const char* sentence : faults_of_halves()) all.emplace_back(sentence);
-  for (const char* sentence : faults_of_transfer()) all.emplace_back(sentence);
+  const auto add = [&](const auto& faults) { all.insert(all.end(), faults.begin(), faults.end()); };
+  add(output::faults_of(volume));
+  add(faults_of_field(*this));
+  add(faults_of_fit(*this));
+  add(faults_of_run(*this));
+  add(faults_of_budget(*this));
+  add(faults_of_halves());
+  add(faults_of_transfer());
   return all;
 }
 

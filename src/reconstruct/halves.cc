@@ -23,7 +23,7 @@ namespace {
 using tilt_series::Half;
 
 // The part of a run's work that one of its fits is, as fractions of all views that are fitted.
-struct Share {
+struct ProgressShare {
   double begin = 0.0, size = 1.0;
 };
 
@@ -33,7 +33,7 @@ struct Part {
   const measurement::Measurement& measurement;
   const std::filesystem::path& model;
   std::vector<measurement::ViewModel> kept_views;  // empty: the fit finds its own
-  Share share;
+  ProgressShare share;
   // Halves are compared to see what the data say, so that no prior may add the same to both.
   bool may_learn = false;
 };

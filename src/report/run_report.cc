@@ -155,8 +155,8 @@ std::vector<HtmlFact> facts_of_fit(const record::FitRecord& fit) {
   if (const auto& speckle = verdict.artefacts.speckle; speckle && std::isfinite(*speckle))
     facts.push_back(
         {"Speckle", fmt::format("{:.3f} %", 100 * *speckle),
-         "Voxels that stick out from all their neighbours. Hardly anybody sees less than "
-         "0.02 %."});
+         "Voxels that stick out from all their neighbours: grains of noise, or detail as small as "
+         "a voxel. A warning says where they are noise."});
   facts.push_back({"Masked", fmt::format("{:.1f} %", 100 * fit.metrics.mask.mean_part()),
                    "Pixels of the views that did not count: beads, fill, bad pixels."});
   facts.push_back({"Time and memory",
