@@ -7,6 +7,7 @@
 #include <iterator>
 #include <optional>
 #include <string>
+#include <system_error>
 
 #include "base/system/child_process.h"
 #include "compare/grid.h"
@@ -90,6 +91,8 @@ std::optional<Grid> grid_to_be(const CompareOptions& options, const RunHooks& ho
                                const fs::path& scratch) {
   if (is_done(row)) return read_grid(row.volume);
   const fs::path log = scratch / "log", grid = scratch / "grid.json";
+  std::error_code absent;
+  fs::remove(grid, absent);  // that of the row before
   auto command = full_command(options.program, row, row.volume);
   command.insert(command.end(), {"--dry-run", "--grid", grid.string()});
   const base::ChildResult result = base::run_child(command, log, hooks.stop_requested);
