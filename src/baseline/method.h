@@ -14,8 +14,8 @@
 namespace tomofield::baseline {
 
 /// The options of one of the methods. Each has facts(), an overload of reconstruct_with() in
-/// method.cc, and one of fields_of() in baseline_record.cc. A new method needs these and a line
-/// here.
+/// method.cc, one of fields_of() in baseline_record.cc and one of rows_of() in method_options.cc.
+/// docs/architecture.md lists what else a new method needs.
 using Method =
     std::variant<WbpOptions, SirtOptions, SartTvOptions, TvOptions, IngpOptions, FourierNetOptions>;
 

@@ -34,7 +34,8 @@ std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
   const bool may_halve = is_adaptive && field.leaf_size % (2 * kernels::kLanes) == 0;
   const int smallest_leaf = may_halve ? field.leaf_size / 2 : *field.leaf_size;
   const int max_bin = is_adaptive ? std::min(fit.coarse_bin, 2) : fit.coarse_bin;
-  for (int bin = 2; bin <= max_bin && smallest_leaf % (bin * kernels::kLanes) == 0; bin *= 2) {
+  const int largest_bin = std::min(max_bin, smallest_leaf / kernels::kLanes);
+  for (int bin = 2; bin <= largest_bin && smallest_leaf % (bin * kernels::kLanes) == 0; bin *= 2) {
     if (std::ssize(bins) < fit.coarse_epochs) bins.push_back(bin);
   }
   return bins;

@@ -105,10 +105,12 @@ void note_settings(std::span<const Setting> settings, Choices& choices) {
 void settle_settings(Choices& choices) {
   for (Setting& setting : choices.options.settings) {
     const std::span<const Row> rows = rows_of_flag(setting.option);
-    if (rows.empty() || !setting.instead.empty()) continue;  // an option of another command
+    if (rows.empty()) continue;              // of another command
+    if (!setting.instead.empty()) continue;  // has lost already
     const Row& row = rows.front();
     if (!is_as_set(setting, choices)) {
       setting.instead = as_given(row.flag, choices);
+      // A rival that the same project set is no choice of the user.
     } else if (row.rival.empty() || !is_of_setting(row.rival, choices)) {
       setting.instead = given_against(row, choices);
       if (!setting.instead.empty())

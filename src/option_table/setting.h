@@ -21,8 +21,9 @@ void apply_settings(std::vector<Setting> settings, Choices& choices);
 /// from who gave them.
 void note_settings(std::span<const Setting> settings, Choices& choices);
 
-/// Notes in Options::settings what holds in place of those that somebody has gone over since
-/// apply_settings(), and takes those back in whose place another option was given since.
+/// Call this after options may have changed since apply_settings(). A setting whose option now has
+/// another value, or loses to an option that was given since, is marked in Setting::instead. In the
+/// second case its option returns to the default.
 void settle_settings(Choices& choices);
 
 /// Returns settings as an array of objects with the members of Setting, for the metrics. Those that

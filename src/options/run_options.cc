@@ -27,7 +27,8 @@ namespace {
 
 void choose_schedule(const SeriesFiles& files, Options& options) {
   FitOptions fit = options.fit;
-  // One epoch stands for any number: the usual schedule depends on which stages there are.
+  // usual_schedule() only asks whether there are coarse and vertex stages. Where their length is
+  // still open, 1 says that there are.
   if (fit.coarse_epochs.is_open()) fit.coarse_epochs = 1;
   const bool has_vertices = fit::begins_with_vertices(options.field, fit);
   if (fit.vertex_epochs.is_open()) fit.vertex_epochs = has_vertices ? 1 : 0;
@@ -111,15 +112,16 @@ std::vector<std::string> faults_of_fit(const ReconstructOptions& options) {
       fit.coarse_bin > 0 && !std::has_single_bit(static_cast<unsigned>(fit.coarse_bin)),
       "--coarse-bin is the largest of binnings that are halved from stage to stage: give a "
       "power of two, such as 2, 4 or 8");
-  faults.refuse_what_throws("", [&] { denoise_factor(fit.denoise); });
   faults.refuse_if(
       fit.prior != Prior::kTv && !may_learn(options),
       "--prior learned works on plain vertices a pixel apart: it needs --field grid, --tree "
       "uniform, --vertex-spacing 1 and --engine slab, and no --budget");
-  faults.refuse_if(fit.density_variation == 0.0 && !options.chooses_weight() &&
-                       fit.denoise != FitOptions().denoise,
-                   "--denoise multiplies the weight of total variation, and --tv 0 turns that off: "
-                   "leave one of them out");
+  faults.refuse_what_throws("", [&] {
+    const double factor = denoise_factor(fit.denoise);
+    faults.refuse_if(fit.density_variation == 0.0 && !options.chooses_weight() && factor != 1.0,
+                     "--denoise multiplies the weight of total variation, and --tv 0 turns that "
+                     "off: leave one of them out");
+  });
   faults.refuse_if(
       fit.patience > 0 && fit.hold_out == 0,
       "--early-stop watches views that --hold-out keeps from the fit: give that as well");
@@ -139,7 +141,7 @@ std::vector<std::string> faults_of_run(const ReconstructOptions& options) {
   faults.refuse_if(run.resume && run.output.empty(),
                    "--resume continues from the files of an interrupted run: give their output");
   faults.refuse_if(run.align != Alignment::kOff && options.fit.engine == Engine::kRay,
-                   "--align refine aligns views in their plane: it needs --engine slab");
+                   "--align aligns views in their plane: it needs --engine slab");
   return std::move(faults).sentences();
 }
 

@@ -50,8 +50,8 @@ std::string names_of_formats() {
 MainFile find_main_file(const fs::path& folder, bool may_have_images) {
   std::vector<MainFile> found = main_files(folder, 0);
   if (found.empty() && may_have_images) return {};
-  constexpr int kLastRank = 2;
-  for (int rank = 1; found.empty() && rank <= kLastRank; ++rank) found = main_files(folder, rank);
+  const int last_rank = std::ranges::max(all_formats(), {}, &Format::rank).rank;
+  for (int rank = 1; found.empty() && rank <= last_rank; ++rank) found = main_files(folder, rank);
   if (found.empty()) {
     throw Error(fmt::format("the folder '{}' has no project that can be read ({}): name a file",
                             folder.string(), names_of_formats()));

@@ -310,6 +310,8 @@ def test_options_that_make_no_sense(good, out, refuse, refuse_series, stack, tlt
     refuse(["-o", "--output"][1:], "reconstruct", stack, *good)
     refuse(["stack"], "reconstruct", "-o", out, *good)
     refuse(["reconstrct"], "reconstrct")
+    refuse_series(["--leaf-size"], stack, "--leaf-size", 0, "--coarse-bin", 2147483647)
+    refuse_series(["--align", "--engine slab"], stack, "--align", "full", "--engine", "ray")
     # Every mistake is named at once.
     refuse_series(["--tv", "--rank", "--leaf-size"], stack, "--tv", -1, "--rank", 0,
                   "--leaf-size", 1)

@@ -467,6 +467,10 @@ def test_tiff_files_that_are_no_stack(series):
     for orientation in (2, 3, 5, 6, 7, 8):
         tifffile.imwrite(tif, np.zeros((8, 8), np.uint16), extratags=[(274, "H", 1, orientation, True)])
         refuse(["a.tif", f"Orientation {orientation}"], tif, *common)
+    tifffile.imwrite(tif, np.zeros((5, 32, 32), np.uint16), photometric="minisblack", contiguous=False)
+    with open(tif, "r+b") as file:
+        file.truncate(os.path.getsize(tif) - 1500)
+    refuse(["a.tif", "truncated or damaged"], tif, *common)
     plain = dict(photometric="minisblack", resolutionunit="CENTIMETER")
     for across, down in ((1e7, 5e6), (5e6, 1e7), (1e7, 1e3)):  # pixels an inch of 10 and 20 Å
         tifffile.imwrite(tif, np.zeros((20, 16, 16), np.uint16), resolution=(across, down), **plain)

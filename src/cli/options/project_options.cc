@@ -48,7 +48,8 @@ std::optional<projects::Project> read_project(const CLI::App& command,
 // file.
 void require_stack(const std::filesystem::path& stack) {
   std::error_code fault;
-  const bool is_half = stack.string().find('@') != std::string::npos;
+  const std::string text = stack.string();
+  const bool is_half = text.starts_with("even@") || text.starts_with("odd@");
   if (!is_half && !std::filesystem::exists(stack, fault) && !fault)
     throw Error(fmt::format("'{}' does not exist", stack.string()));
 }

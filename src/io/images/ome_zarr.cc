@@ -153,14 +153,20 @@ bool is_number(const std::string& name) {
   return std::ranges::all_of(name, [](char c) { return c >= '0' && c <= '9'; });
 }
 
-// Says whether write_ome_zarr() gives this name to a file (or else a folder) at a depth of a store.
-// Levels are folders "0", "1", … of the top; chunks are numbers below them, or below "c".
-bool is_own_name(const std::string& name, bool is_plain, int depth) {
-  constexpr std::array<const char*, 4> kOfTop{kZarrMarker, ".zattrs", ".zgroup", "zarr.json"};
+// Says whether write_ome_zarr() gives this name to a file at a depth of a store: the group is
+// described at the top, a level at depth 1, and chunks are numbers.
+bool is_own_file(const std::string& name, int depth) {
+  constexpr std::array<const char*, 4> kOfGroup{kZarrMarker, ".zattrs", ".zgroup", "zarr.json"};
   constexpr std::array<const char*, 2> kOfLevel{".zarray", "zarr.json"};
-  if (is_plain && depth == 0) return std::ranges::find(kOfTop, name) != kOfTop.end();
-  if (is_plain && depth == 1 && std::ranges::find(kOfLevel, name) != kOfLevel.end()) return true;
-  return is_number(name) || (!is_plain && depth == 1 && name == "c");
+  if (depth == 0) return std::ranges::find(kOfGroup, name) != kOfGroup.end();
+  if (depth == 1) return std::ranges::find(kOfLevel, name) != kOfLevel.end();
+  return is_number(name);
+}
+
+// Says the same for a folder: levels, and the folders of their chunks, which are numbers or lie in
+// "c".
+bool is_own_folder(const std::string& name, int depth) {
+  return is_number(name) || (depth == 1 && name == "c");
 }
 
 // Says whether a folder of the top is a level: it has the description of an array.
@@ -187,16 +193,20 @@ void require_replaceable_zarr(const std::filesystem::path& path) {
   std::filesystem::recursive_directory_iterator entries(path, absent), end;
   for (; !absent && entries != end; entries.increment(absent)) {
     const bool is_folder = entries->is_directory() && !entries->is_symlink();
-    const bool is_own =
-        !entries->is_symlink() &&
-        is_own_name(entries->path().filename().string(), !is_folder, entries.depth()) &&
-        (!is_folder || entries.depth() > 0 || is_level(entries->path()));
+    const std::string name = entries->path().filename().string();
+    const int depth = entries.depth();
+    const bool is_own = is_folder
+                            ? is_own_folder(name, depth) && (depth > 0 || is_level(entries->path()))
+                            : !entries->is_symlink() && is_own_file(name, depth);
     if (is_own) continue;
     throw Error(
         fmt::format("cannot replace '{}': it has '{}', which tomofield has not made; move one of "
                     "them away, or give another name",
                     path.string(), entries->path().lexically_relative(path).string()));
   }
+  if (absent && std::filesystem::exists(path))
+    throw Error(fmt::format("cannot replace '{}': it cannot be looked through ({})", path.string(),
+                            absent.message()));
 }
 
 void write_ome_zarr(const std::filesystem::path& mrc, const std::filesystem::path& zarr,

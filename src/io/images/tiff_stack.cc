@@ -23,9 +23,9 @@ namespace {
 
 constexpr std::uint32_t kLargestSide = std::uint32_t{1} << 24;
 constexpr std::size_t kMostPages = 100'000;
-// No compression of libtiff makes images smaller than this part of their size; deflate's limit is
-// 1/1032.
-constexpr double kLargestCompression = 4096;
+// Compression makes no real image smaller than this part of its size; deflate's limit is 1/1032,
+// and LZMA reaches 1/7000 for a blank one.
+constexpr double kLargestCompression = 65536;
 
 int keep_first_message(TIFF*, void* user_data, const char*, const char* format, va_list arguments) {
   auto& message = *static_cast<std::string*>(user_data);
@@ -139,9 +139,10 @@ class TiffFile {
     if (format.samples == 1 && ((is_integer && has_bits) || is_float))
       return require_grey(format, page);
     fail(fmt::format(
-        "has {} {} of {} bits a pixel on page {}; grey values of 8, 16 or 32 bits can "
-        "be read",
-        format.samples, format.samples == 1 ? "value" : "values", format.bits, page + 1));
+        "has {} {} of {} bits a pixel on page {}{}; grey values that are whole numbers of 8, 16 or "
+        "32 bits or floats of 32 bits can be read",
+        format.samples, format.samples == 1 ? "value" : "values", format.bits, page + 1,
+        is_integer ? "" : ", which are no whole numbers"));
   }
 
   // Values may stand for colours of a palette, or count down from white (TIFF 6.0, page 37).
@@ -151,9 +152,10 @@ class TiffFile {
         (format.photometric == PHOTOMETRIC_MINISWHITE && is_unsigned))
       return;
     fail(fmt::format("has {} on page {}; grey values from black can be read: convert it",
-                     format.photometric == PHOTOMETRIC_PALETTE      ? "numbers of a palette"
-                     : format.photometric == PHOTOMETRIC_MINISWHITE ? "signed values from white"
-                                                                    : "colours",
+                     format.photometric == PHOTOMETRIC_PALETTE ? "numbers of a palette"
+                     : format.photometric == PHOTOMETRIC_MINISWHITE
+                         ? "signed values or floats that count from white"
+                         : "colours",
                      page + 1));
   }
 
@@ -281,6 +283,8 @@ class TiffStack : public ImageStack {
       pages_.push_back(TIFFCurrentDirOffset(file.handle()));
       if (pages_.size() > kMostPages) file.fail("has more pages than any tilt series");
     } while (TIFFReadDirectory(file.handle()) != 0);
+    if (TIFFLastDirectory(file.handle()) == 0)
+      file.fail(fmt::format("is truncated or damaged after page {}", pages_.size()));
     header_.nx = format_.width;
     header_.ny = format_.height;
     header_.nz = std::ssize(pages_);
