@@ -17,6 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   options.field.budget = "0.1dB";
   measurement::Measurement series;
   series.roi = {0, 0, 64, 128};
+  series.geometry.thickness = 21.5;  // that of the seeds
   checkpoint::FitOrigin origin;
   origin.fingerprint = "the fingerprint";
   std::ofstream(output::output_paths(options.run.output).tiles, std::ios::binary)

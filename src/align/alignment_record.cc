@@ -128,6 +128,8 @@ std::string text_at(const json& object, const char* key) {
   return value.get<std::string>();
 }
 
+constexpr double kLargestTilt_deg = 90.0;
+
 double number_at(const json& object, const char* key) {
   return io::number_at(object, key, -base::kLargestNumber, base::kLargestNumber);
 }
@@ -181,13 +183,21 @@ LocalRecord local_from(const json& object) {
 }
 
 FoundPose pose_from(const json& object) {
+  constexpr double kThinnest_px = 0.01;
+  const auto angle_at = [&](const char* key) {
+    return io::number_at(object, key, -kLargestTilt_deg, kLargestTilt_deg);
+  };
+  const auto error_at = [&](const char* key) {
+    return io::number_at(object, key, 0, base::kLargestNumber);
+  };
   FoundPose found;
-  found.pose = {.thickness_px = number_at(object, "thickness_px"),
-                .pitch_deg = number_at(object, "pitch_deg"),
-                .x_tilt_deg = number_at(object, "x_tilt_deg")};
-  found.error = {.thickness_px = number_at(object, "thickness_error_px"),
-                 .pitch_deg = number_at(object, "pitch_error_deg"),
-                 .x_tilt_deg = number_at(object, "x_tilt_error_deg")};
+  found.pose = {.thickness_px =
+                    io::number_at(object, "thickness_px", kThinnest_px, base::kLargestPosition_px),
+                .pitch_deg = angle_at("pitch_deg"),
+                .x_tilt_deg = angle_at("x_tilt_deg")};
+  found.error = {.thickness_px = error_at("thickness_error_px"),
+                 .pitch_deg = error_at("pitch_error_deg"),
+                 .x_tilt_deg = error_at("x_tilt_error_deg")};
   return found;
 }
 
@@ -212,7 +222,7 @@ geometry::ViewWarp motion_from(const json& rows, const std::optional<LocalRecord
 }
 
 AlignedView view_from(const json& object, const std::optional<LocalRecord>& local) {
-  constexpr double kLargestLog = 1.0, kLargestTilt_deg = 90.0, kLargestTiltChange_deg = 30.0;
+  constexpr double kLargestLog = 1.0, kLargestTiltChange_deg = 30.0;
   AlignedView view{
       .tilt_deg = io::number_at(object, "tilt_deg", -kLargestTilt_deg, kLargestTilt_deg),
       .shift_px = positions_at(object, "shift_px"),

@@ -40,6 +40,11 @@ void FinishedTiles::read() {
   const auto text = [&](const char* name) { return as_text(state.integers[name]); };
   if (!model.coded || text("fingerprint") != origin_.fingerprint)
     throw Error(fmt::format("'{}' was made from another series or with other options", path));
+  if (model.coded->thickness != series_.geometry.thickness)
+    throw Error(
+        fmt::format("'{}' is damaged: its field is {} pixels thick, and this run's {}; "
+                    "--overwrite starts over",
+                    path, model.coded->thickness, series_.geometry.thickness));
   if (text("budget") != options_.field.budget)
     throw Error(fmt::format("'{}' was made with --budget {}: give the same", path, text("budget")));
   try {

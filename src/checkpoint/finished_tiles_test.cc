@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -35,6 +36,7 @@ class FinishedTilesTest : public ::testing::Test {
     options_.run.resume = true;
     options_.field.budget = "0.1dB";
     series_.roi = {0, 0, 64, 128};
+    series_.geometry = model_.geometry;
     origin_.fingerprint = "the fingerprint";
     model_.coded =
         compact::compress(*model_.field, model_.roi, compact::parse_budget("0.1dB")).coded;
@@ -81,6 +83,20 @@ TEST_F(FinishedTilesTest, AreRefusedIfSomebodyHasChangedThem) {
   for (const json& tiles : damaged)
     EXPECT_NE(message_of<Error>([&] { read(tiles); }).find("run_tiles.h5"), std::string::npos)
         << tiles.dump();
+}
+
+TEST_F(FinishedTilesTest, AreRefusedIfTheirFieldIsAnother) {
+  const auto refusal = [&] { return message_of<Error>([&] { read(json::array({tile(0, 64)})); }); };
+  EXPECT_EQ(refusal(), "");
+  model_.density_unit = 0;
+  EXPECT_NE(refusal().find("density_unit"), std::string::npos) << refusal();
+  model_.density_unit = 40;
+  const std::vector<double> steps = model_.coded->codes.step;
+  std::ranges::fill(model_.coded->codes.step, 0);
+  EXPECT_NE(refusal().find("step of 0"), std::string::npos) << refusal();
+  model_.coded->codes.step = steps;
+  series_.geometry.thickness += 1;
+  EXPECT_NE(refusal().find("thick"), std::string::npos) << refusal();
 }
 
 TEST_F(FinishedTilesTest, RefuseATileThatDoesNotFollowTheirField) {

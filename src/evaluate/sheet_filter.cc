@@ -1,5 +1,7 @@
 #include "evaluate/sheet_filter.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -112,6 +114,14 @@ DetectionScore membrane_score(const base::Volume& volume, const base::Volume& la
   TOMOFIELD_CHECK(volume.shape == label.shape, "the label has another shape than the volume");
   if (!is_known_voxel_size(label.voxel_size_A))
     throw Error("the label of membranes has no voxel size, which the filter for sheets needs");
+  const auto num_bad =
+      std::ranges::count_if(label.data, [](float value) { return !std::isfinite(value); });
+  if (num_bad > 0) {
+    throw Error(
+        fmt::format("the label of membranes has {} voxels that are no finite numbers: write "
+                    "1 where there is membrane and 0 elsewhere",
+                    num_bad));
+  }
   const base::Volume response = sheet_response(volume, kSheetSigma_A / label.voxel_size_A);
   std::vector<Detection> voxels(response.data.size());
   std::size_t num_true = 0;

@@ -85,6 +85,10 @@ TEST(MembraneScore, DoesNotDependOnScaleAndOffset) {
 TEST(MembraneScore, RefusesALabelWithoutMembranes) {
   const base::Volume label({16, 16, 16}, 10.0);
   EXPECT_THROW(membrane_score(label, label), Error);
+  const base::Volume volume = shell(15.0, 2.0);
+  base::Volume broken = volume;
+  broken.data[7] = std::nanf("");
+  EXPECT_THROW(membrane_score(volume, broken), Error);
 }
 
 }  // namespace

@@ -37,6 +37,10 @@ struct Range {
   }
 
   bool contains(double value) const;
+  /// Tells whether the range itself ends, and not with the largest number of all options.
+  constexpr bool has_upper_limit() const {
+    return kind != Kind::kAny && kind != Kind::kAbove && kind != Kind::kAtLeast;
+  }
   /// Returns the end of the sentence "it must be …": "from 1 to 256".
   std::string text() const;
 };

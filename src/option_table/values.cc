@@ -322,7 +322,8 @@ std::vector<std::string> range_faults(const Options& options) {
             return;
           }
           const auto as_real = static_cast<double>(number);
-          const bool is_huge = std::isfinite(as_real) && as_real > base::kLargestNumber;
+          const bool is_huge = std::isfinite(as_real) && as_real > base::kLargestNumber &&
+                               !row.range.has_upper_limit();
           faults.push_back(fmt::format(
               "{} must be {}{}, not {}", flag_of(row.key), row.range.text(),
               is_huge ? fmt::format(" and at most {:g}", base::kLargestNumber) : "", number));

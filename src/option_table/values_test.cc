@@ -303,6 +303,15 @@ TEST(OptionTable, NumbersWithoutUpperLimitAreStillPlausible) {
   EXPECT_NE(faults[0].find("at most 1e+09"), std::string::npos) << faults[0];
 }
 
+TEST(OptionTable, ALimitIsNamedOnce) {
+  Options options;
+  options.specimen.thickness = 20;
+  options.views.pixel_size_A = 1e300;
+  const std::vector<std::string> faults = range_faults(options);
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_EQ(faults[0].find("at most"), std::string::npos) << faults[0];
+}
+
 TEST(OptionTable, RangesHoldTheirLimits) {
   EXPECT_TRUE(Range::between(1, 256).contains(256));
   EXPECT_FALSE(Range::between(1, 256).contains(257));

@@ -99,7 +99,16 @@ TEST(CompactModel, NumbersThatNoModelHasAreRefused) {
           refusal([&](Model& model) { model.coded->codes.step[0] = number; }, most_bytes);
       EXPECT_NE(said.find("steps"), std::string::npos) << number << said;
     }
-    for (const double unit : {1e300, 1e16})
+    // Codes times 0, or almost 0, would be an empty volume.
+    EXPECT_NE(
+        refusal([](Model& model) { std::ranges::fill(model.coded->codes.step, 0); }, most_bytes)
+            .find("step of 0"),
+        std::string::npos);
+    EXPECT_NE(refusal([](Model& model) { model.coded->codes.step[0] = 1e-300; }, most_bytes), "");
+    EXPECT_NE(
+        refusal([](Model& model) { model.geometry.thickness *= 2; }, most_bytes).find("thick"),
+        std::string::npos);
+    for (const double unit : {1e300, 1e16, 0.0, -40.0, 1e-300})
       EXPECT_NE(refusal([&](Model& model) { model.density_unit = unit; }, most_bytes), "") << unit;
     const auto more_components = [](Model& model) {
       model.coded->codes.shapes[1].rank_x = model.coded->codes.shapes[1].nx + 1;
@@ -108,6 +117,26 @@ TEST(CompactModel, NumbersThatNoModelHasAreRefused) {
     // Every number is plausible, but not what they make together.
     EXPECT_NE(refusal([](Model& model) { model.coded->codes.step[0] = 9e8; }, most_bytes), "");
     EXPECT_EQ(refusal([](Model&) {}, most_bytes), "");
+  }
+}
+
+TEST(CompactModel, WhatCodesDoNotHaveIsRefused) {
+  if (!python_has("h5py")) GTEST_SKIP() << "python3-h5py is not installed";
+  const ScratchDirectory scratch;
+  for (const std::string change :
+       {"['bias'] = 0.5", "['softplus_beta'] = 3.0", "['kind'] = np.bytes_('grid')"}) {
+    save_model(scratch / "model.h5", compact_model());
+    ASSERT_EQ(run_python(scratch,
+                         "import h5py, numpy as np\nwith h5py.File('model.h5', 'r+', "
+                         "libver='latest') as f:\n    f['field'].attrs" +
+                             change + "\n"),
+              "");
+    for (const std::size_t most_bytes : {std::size_t{1000}, std::size_t{1} << 30})
+      EXPECT_NE(message_of<Error>([&] {
+                  load_to_sample(scratch / "model.h5", most_bytes);
+                }).find("codes"),
+                std::string::npos)
+          << change;
   }
 }
 

@@ -22,8 +22,11 @@ namespace {
 
 using io::StoredGroup;
 
-// Densities within plausible numbers, times this, are finite floats.
-constexpr double kLargestDensityUnit = 1e15;
+// Densities within plausible numbers, times the largest unit, are finite floats. A smaller one than
+// the least, or a smaller step, would make them zeros; the contrast of no series gives one.
+constexpr double kLeastUnit = 1e-30;
+constexpr base::Interval kDensityUnits{kLeastUnit, 1e15};
+constexpr base::Interval kSteps{kLeastUnit, base::kLargestNumber};
 
 using Integers = std::vector<std::int64_t>;
 
@@ -69,6 +72,8 @@ class ModelReader {
       read_compact_field(group, choose, most_decoded_bytes, model);
     else
       model.field = read_field(group, choose);
+    require(model.thickness() == model.geometry.thickness,
+            "the thickness of its field is not that of its geometry");
     if (training != nullptr) *training = read_training(/*with_floats=*/true);
     return model;
   }
@@ -154,7 +159,7 @@ class ModelReader {
     require_known_format(root);
     info.x_tilt_deg = root.number("x_tilt_deg", base::kLargestAngle_deg);
     info.pixel_size_A = root.number("pixel_size_A", base::kPixelSizes_A);
-    info.density_unit = root.number("density_unit", kLargestDensityUnit);
+    info.density_unit = root.number("density_unit", kDensityUnits);
     info.is_dark = root.text("contrast") == "dark";
     info.options_json = root.text("options_json");
     info.written_by = root.text("written_by");
@@ -212,9 +217,13 @@ class ModelReader {
     return field::Quadtree(roots, std::move(nodes));
   }
 
-  std::vector<field::LeafShape> read_shapes(const StoredGroup& group, int num_leaves,
+  // Reads the leaves of a tree, whose nodes the file names as well.
+  std::vector<field::LeafShape> read_shapes(const StoredGroup& group, const field::Quadtree& tree,
                                             int fewest = 2) const {
-    std::vector<field::LeafShape> shapes(static_cast<std::size_t>(num_leaves));
+    std::vector<field::LeafShape> shapes(static_cast<std::size_t>(tree.num_leaves()));
+    Integers nodes(shapes.size());
+    group.read_array<std::int64_t>("node", nodes);
+    require(std::ranges::equal(nodes, tree.leaves()), "its leaves are not those of its tree");
     const auto read = [&](const char* name, int field::LeafShape::*member, std::int64_t min) {
       Integers column(shapes.size());
       group.read_array<std::int64_t>(name, column);
@@ -242,6 +251,15 @@ class ModelReader {
       require(needed <= left, "its leaves need more parameters than it holds");
       left -= needed;
     }
+  }
+
+  // The index of the leaves' parameters follows from their shapes.
+  void require_offsets(const StoredGroup& leaves, const field::Field& field) const {
+    Integers offsets(static_cast<std::size_t>(field.tree().num_leaves()) + 1);
+    leaves.read_array<std::int64_t>("offset", offsets);
+    for (int i = 0; i <= field.tree().num_leaves(); ++i)
+      require(offsets[static_cast<std::size_t>(i)] == static_cast<std::int64_t>(field.offset(i)),
+              "the index of its parameters is wrong");
   }
 
   double read_thickness(const StoredGroup& group) const {
@@ -273,7 +291,7 @@ class ModelReader {
     make_room([&] {
       field::Quadtree tree = read_tree(group.group("tree"));
       if (choose) kept = choose(tree);
-      auto shapes = read_shapes(group.group("leaves"), tree.num_leaves());
+      auto shapes = read_shapes(group.group("leaves"), tree);
       const std::string name = group.text("kind");
       const auto kind = base::enum_named<FieldKind>(name);
       if (!kind) fail(fmt::format("there is no field '{}'", name));
@@ -282,6 +300,7 @@ class ModelReader {
       field = field::make_field(*kind, std::move(tree), thickness, std::move(shapes));
     });
     read_decoder(group, *field);
+    require_offsets(group.group("leaves"), *field);
     if (choose) {
       field->keep_only(kept);
       require(group.array_size("parameters") == field->num_parameters(),
@@ -294,9 +313,18 @@ class ModelReader {
     return field;
   }
 
+  // Codes hold densities themselves, of which nothing else is made.
+  void require_densities_in_codes(const StoredGroup& group) const {
+    require(group.text("kind") == base::name_of(FieldKind::kVm), "its codes are of no field 'vm'");
+    for (const char* name : {"bias", "softplus_beta"})
+      require(group.number(name, base::kLargestNumber) == 0.0,
+              "it has codes and a bias or a softplus_beta, which codes do not have");
+  }
+
   void read_compact_field(const StoredGroup& group, const ChooseLeaves& choose,
                           std::size_t most_decoded_bytes, Model& model) const {
     std::vector<int> kept;
+    require_densities_in_codes(group);
     make_room([&] {
       compact::CodedField coded{read_tree(group.group("tree")), read_thickness(group), {}};
       if (choose) kept = choose(coded.tree);
@@ -313,7 +341,6 @@ class ModelReader {
       model.coded = std::move(coded);
     });
     if (!model.field) return;
-    read_decoder(group, *model.field);
     if (choose) model.field->keep_only(kept);
     require_plausible_parameters(*model.field, fmt::format("'{}' is a damaged model", path_));
   }
@@ -323,16 +350,16 @@ class ModelReader {
     const int num_leaves = tree.num_leaves();
     compact::LeafCodes codes{.step = group.read_array<double>("step"),
                              .face_weight = group.read_array<double>("face_weight"),
-                             .shapes = read_shapes(field.group("leaves"), num_leaves, 1),
+                             .shapes = read_shapes(field.group("leaves"), tree, 1),
                              .offset = group.read_array<std::int64_t>("offset"),
                              .bytes = group.read_array<std::uint8_t>("bytes")};
     require(std::ranges::all_of(codes.shapes, compact::has_possible_ranks),
             "a leaf has more components than vertices");
     const auto num_bands = tree.roots().rows;
-    require(std::ssize(codes.step) == num_bands &&
-                std::ranges::all_of(codes.step,
-                                    [](double s) { return s >= 0 && base::is_plausible(s); }),
-            "its steps are no usable numbers");
+    require(
+        std::ssize(codes.step) == num_bands &&
+            std::ranges::all_of(codes.step, [](double s) { return s == 0 || kSteps.contains(s); }),
+        "its steps are no usable numbers");
     require(std::ssize(codes.face_weight) == num_bands &&
                 std::ranges::all_of(codes.face_weight, [](double w) { return w >= 0 && w <= 0.5; }),
             "the weights of its faces are no usable numbers");
@@ -340,6 +367,10 @@ class ModelReader {
                 std::ranges::is_sorted(codes.offset) &&
                 codes.offset.back() == std::ssize(codes.bytes),
             "the index of its codes is wrong");
+    for (int leaf = 0; leaf < num_leaves; ++leaf)
+      require(codes.code(leaf).empty() ||
+                  codes.step[static_cast<std::size_t>(tree.band_of_leaf(leaf))] > 0,
+              "a band of leaves with codes has a step of 0");
     return codes;
   }
 

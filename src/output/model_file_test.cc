@@ -318,6 +318,13 @@ TEST(ModelFile, RefusesWhatIsConsistentHdf5ButNoSoundModel) {
       {"f['geometry/tilt_deg'][1] = float('nan')", "geometry"},
       {"f['geometry/roi'][2] = 1000", "region of interest"},
       {"f.attrs.modify('pixel_size_A', 0.0)", "pixel_size_A"},
+      {"f['field'].attrs['thickness'] = 21.0", "thickness of its field"},
+      {"f['geometry'].attrs['thickness'] = 43.0", "thickness of its field"},
+      {"f.attrs.modify('density_unit', 0.0)", "density_unit"},
+      {"f.attrs.modify('density_unit', -40.0)", "density_unit"},
+      {"f.attrs.modify('density_unit', 1e-300)", "density_unit"},
+      {"f['field/leaves/node'][2] = 1", "leaves"},
+      {"f['field/leaves/offset'][2] = 16", "index of its parameters"},
       {"del f['geometry']", "geometry"},
   };
   std::string script = kEditor;

@@ -126,6 +126,15 @@ std::optional<std::vector<double>> CommandEntries::numbers(std::string_view name
   return values;
 }
 
+std::optional<std::vector<double>> CommandEntries::sizes(std::string_view name) {
+  auto found = numbers(name, 2, 2);
+  if (found && !(found->at(0) > 0 && found->at(1) > 0))
+    fail(*find(name), fmt::format("a width and a height above 0: correct it, or go on with "
+                                  "--ignore {}",
+                                  name));
+  return found;
+}
+
 std::optional<double> CommandEntries::number(std::string_view name) {
   const auto values = numbers(name, 1, 1);
   return values ? std::optional(values->front()) : std::nullopt;

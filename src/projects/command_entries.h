@@ -39,6 +39,8 @@ class CommandEntries {
   std::optional<std::vector<double>> numbers(std::string_view name, std::size_t fewest,
                                              std::size_t most,
                                              std::span<const double> defaults = {});
+  /// Returns a width and a height, which must be above 0; nothing as numbers() does.
+  std::optional<std::vector<double>> sizes(std::string_view name);
   std::optional<double> number(std::string_view name);
   /// Returns the texts of an entry that may come several times.
   std::vector<std::string> texts(std::string_view name);

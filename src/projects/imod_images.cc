@@ -172,8 +172,8 @@ void place_aligned_stack(CommandEntries& newst, const io::MrcHeader& raw, ImodIm
 // SUBSETSTART, that of the whole views of which it is a part. Then its own size is known if it is
 // there.
 void place_aligned_part(CommandEntries& tilt, ImodImages& images) {
-  const auto full = tilt.numbers("FULLIMAGE", 2, 2);
-  if (!full || !(full->at(0) > 0 && full->at(1) > 0)) return;
+  const auto full = tilt.sizes("FULLIMAGE");
+  if (!full) return;
   images.size_entry = "FULLIMAGE";
   images.imod_width = full->at(0);
   images.imod_height = full->at(1);

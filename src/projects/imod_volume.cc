@@ -87,7 +87,7 @@ void set_roi(Project& project, CommandEntries& tilt, const ImodImages& images, d
 
 void set_center(Project& project, CommandEntries& tilt, const ImodImages& images,
                 double axis_offset) {
-  const auto full = tilt.numbers("FULLIMAGE", 2, 2);
+  const auto full = tilt.sizes("FULLIMAGE");
   const auto start = tilt.numbers("SUBSETSTART", 2, 2, std::array{0.0, 0.0});
   if (start && !full && (start->at(0) != 0 || start->at(1) != 0)) {
     throw Error(
@@ -98,7 +98,7 @@ void set_center(Project& project, CommandEntries& tilt, const ImodImages& images
   const double left = images.width / 2 + images.imod_offset_x - images.imod_width / 2;
   const double bottom = images.height / 2 + images.imod_offset_y - images.imod_height / 2;
   double axis = left + images.imod_width / 2, middle = bottom + images.imod_height / 2;
-  if (full && full->at(0) > 0 && (start || !project.ignores("SUBSETSTART"))) {
+  if (full && (start || !project.ignores("SUBSETSTART"))) {
     axis = left + full->at(0) / 2 - (start ? start->at(0) : 0.0);
     middle = bottom + full->at(1) / 2 - (start ? start->at(1) : 0.0);
   }

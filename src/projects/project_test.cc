@@ -201,6 +201,11 @@ TEST(ImodProject, TheTiltAxisIsWhereTheSubsetHasIt) {
   EXPECT_EQ(center(whole, "OFFSET ,-7\n"), "23");
   imod.write_tilt("IMAGEBINNED 2\nFULLIMAGE 60 40\nSUBSETSTART 0 6\nXAXISTILT 2\n");
   expect_parts(imod.warnings(), {"SUBSETSTART", "-6 unbinned"});
+  for (const std::string bad : {"0 0", "-32 32", "60 0"}) {
+    imod.write_tilt("IMAGEBINNED 2\nFULLIMAGE " + bad + "\n");
+    expect_parts(imod.refusal(), {"tilt.com', line 7", "FULLIMAGE " + bad, "--ignore FULLIMAGE"});
+    EXPECT_EQ(imod.refusal({"FULLIMAGE"}), "");
+  }
   imod.write_tilt("IMAGEBINNED 2\nSUBSETSTART 4 0\n");
   expect_parts(imod.refusal(), {"SUBSETSTART", "FULLIMAGE"});
 }

@@ -60,8 +60,13 @@ void set_optics(Project& project, const io::RelionTomogram& tomogram, const fs::
   set("--cs", "rlnSphericalAberration", tomogram.optics.spherical_aberration_mm);
   set("--amplitude-contrast", "rlnAmplitudeContrast", tomogram.optics.amplitude_contrast);
   // RELION adds rlnTomoHand · z to the defocus, and z falls to the right at a positive tilt.
-  if (tomogram.hand)
-    project.set("--defocus-hand", *tomogram.hand < 0.0 ? "1" : "-1", star, "rlnTomoHand");
+  if (!tomogram.hand) return;
+  if (*tomogram.hand != 1.0 && *tomogram.hand != -1.0) {
+    throw Error(
+        fmt::format("'{}', tomogram {}: _rlnTomoHand is {}, and a hand is 1 or -1: correct it",
+                    star.string(), tomogram.name, *tomogram.hand));
+  }
+  project.set("--defocus-hand", *tomogram.hand < 0.0 ? "1" : "-1", star, "rlnTomoHand");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/json.h"
@@ -100,6 +101,28 @@ TEST_F(AlignmentRecord, IsReadAsItWasWritten) {
   apply_alignment(read, options);
   EXPECT_EQ(options.corrections, found().corrections);
   EXPECT_EQ(options.left_out, (std::vector<std::int64_t>{2}));
+}
+
+TEST_F(AlignmentRecord, HasAPoseThatCanBe) {
+  const auto refusal_of = [&](const char* key, double number) {
+    record_["pose"] = {{"pitch_deg", 3.0},     {"pitch_error_deg", 0.5},
+                       {"x_tilt_deg", -2.0},   {"x_tilt_error_deg", 0.5},
+                       {"thickness_px", 20.0}, {"thickness_error_px", 2.0}};
+    record_["pose"][key] = number;
+    io::write_json(file_, record_);
+    return refusal(run());
+  };
+  EXPECT_EQ(refusal_of("pitch_deg", 6.0), "");
+  for (const auto& [key, number] :
+       std::vector<std::pair<const char*, double>>{{"pitch_deg", -5e8},
+                                                   {"pitch_deg", 91},
+                                                   {"x_tilt_deg", -91},
+                                                   {"pitch_error_deg", -0.1},
+                                                   {"thickness_px", 0},
+                                                   {"thickness_px", -20},
+                                                   {"thickness_px", 1e9},
+                                                   {"x_tilt_error_deg", -1}})
+    EXPECT_NE(refusal_of(key, number).find(key), std::string::npos) << key << " " << number;
 }
 
 TEST_F(AlignmentRecord, IsOfOneSeries) {

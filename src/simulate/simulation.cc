@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/plausible.h"
 #include "base/random.h"
 
 namespace tomofield::simulate {
@@ -95,7 +96,8 @@ std::vector<std::string> SimulationOptions::validate() const {
   require(in_sizes(cell.size_px), "the size", static_cast<double>(cell.size_px), sizes);
   require(in_sizes(cell.thickness_px), "the thickness", static_cast<double>(cell.thickness_px),
           sizes);
-  require(is_positive(voxel_size_A), "the voxel size", voxel_size_A, "above 0 Å");
+  require(base::is_plausible_pixel_size(voxel_size_A), "the voxel size", voxel_size_A,
+          fmt::format("{} to {} Å", base::kPixelSizes_A.low(), base::kPixelSizes_A.high()));
   require(is_spread(noise, 1e6), "the noise", noise, "0 or more");
   require(!dose || (is_positive(*dose) && *dose <= 1e9), "the dose", dose.value_or(0.0),
           "above 0 electrons per pixel and view, and at most 1e9");

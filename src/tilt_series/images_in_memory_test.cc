@@ -66,6 +66,14 @@ TEST(ImagesInMemory, RefuseTiltsThatAreNoUsableAngles) {
   }
 }
 
+TEST(ImagesInMemory, AreNotToldOfOptionsForFiles) {
+  TiltSeriesOptions options;
+  options.images = io::image_stack_in_memory(all_values(), kWidth, kHeight, {0.0, 0.0, 0.0}, 2.5);
+  const std::string said = message_of<Error>([&] { const TiltSeries series(options); });
+  EXPECT_NE(said.find("give the tilt angles"), std::string::npos) << said;
+  EXPECT_EQ(said.find("--tlt"), std::string::npos) << said;
+}
+
 TEST(ImagesInMemory, RefuseCountsThatDoNotAgree) {
   EXPECT_THROW(io::image_stack_in_memory(std::vector<float>(7), 2, 2, {0.0}, 1.0), Error);
   EXPECT_THROW(io::image_stack_in_memory(std::vector<float>(4), 2, 2, {0.0, 1.0}, 1.0), Error);

@@ -30,6 +30,20 @@ void require_raw_size(const io::AreTomoAlignment& alignment, const std::filesyst
       path.string(), (*raw_size)[0], (*raw_size)[1], stack.name(), header.nx, header.ny));
 }
 
+// A stack that AreTomo wrote may lack the dark frames, and versions count them or not.
+void warn_of_other_count(const io::AreTomoAlignment& alignment, const std::filesystem::path& path,
+                         const io::ImageStack& stack) {
+  const auto num_rows = std::ssize(alignment.rows);
+  const auto num_dark = std::ssize(alignment.dark_sections);
+  if (!alignment.raw_size) return;
+  const std::int64_t stated = (*alignment.raw_size)[2];
+  if (stated == num_rows || stated == num_rows + num_dark) return;
+  base::log_warning(fmt::format(
+      "'{}' states a stack of {} sections (RawSize) and has {} rows and {} dark frames; '{}' has "
+      "{} sections: are they of one series?",
+      path.string(), stated, num_rows, num_dark, stack.name(), stack.header().nz));
+}
+
 AlignedSection section_of(const io::AreTomoRow& row) {
   const double cosine = std::cos(radians(row.rotation_deg));
   const double sine = std::sin(radians(row.rotation_deg));
@@ -77,6 +91,7 @@ SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::Im
   require_raw_size(alignment, path, stack);
   const auto sections =
       io::assign_aretomo_sections(alignment, path, stack.header().nz, stack.name());
+  warn_of_other_count(alignment, path, stack);
   SectionTable table{.source = path.string(), .of_section = {}};
   table.of_section.resize(static_cast<std::size_t>(stack.header().nz));
   for (std::size_t row = 0; row < sections.size(); ++row)

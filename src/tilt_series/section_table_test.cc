@@ -1,5 +1,6 @@
 #include "tilt_series/section_table.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -83,6 +84,24 @@ TEST(SectionTable, SaysThatMagnificationsOfAreTomoAreNotApplied) {
   };
   EXPECT_EQ(warnings_with("1.00000"), "");
   EXPECT_NE(warnings_with("1.00200").find("GMAG"), std::string::npos);
+}
+
+TEST(SectionTable, SaysThatAreTomoAlignedAStackOfOtherSections) {
+  const testing::ScratchDirectory folder;
+  const auto warnings_with = [&](int stated, const std::string& dark) {
+    const auto aln = folder.write(
+        "a.aln",
+        fmt::format("# RawSize = 64 48 {}\n{}1 0 1 0 0 0 0 0 0 -10\n2 0 1 0 0 0 0 0 0 10\n", stated,
+                    dark));
+    const testing::WarningCatcher warnings;
+    sections_of_aretomo(aln, SizedStack(64, 48, 2), true);
+    return warnings.text();
+  };
+  EXPECT_EQ(warnings_with(2, ""), "");
+  EXPECT_EQ(warnings_with(3, "# DarkFrame = 2 3 20\n"), "");  // the stack is without it
+  const std::string said = warnings_with(41, "");
+  for (const char* part : {"a.aln", "41 sections", "RawSize", "2 rows"})
+    EXPECT_NE(said.find(part), std::string::npos) << part << " in " << said;
 }
 
 // RELION 5, Tomogram::setProjectionMatrix: the shift, int(size / 2) of the image, the rotations,

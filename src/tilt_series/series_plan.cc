@@ -12,6 +12,7 @@
 #include "base/plausible.h"
 #include "geometry/raw_from_aligned.h"
 #include "io/images/mrc.h"
+#include "io/images/mrc_facts.h"
 #include "io/saving/scratch_memory.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/view_table.h"
@@ -151,6 +152,43 @@ double pixel_size_of_mdoc(const io::Mdoc& mdoc, const std::filesystem::path& pat
   return spacing_A;
 }
 
+/// Returns the facts of a stack that is an MRC file.
+std::optional<io::MrcFacts> facts_of(const TiltSeriesOptions& options,
+                                     const io::ImageStack& stack) {
+  if (stack.is_in_memory()) return std::nullopt;
+  return io::find_mrc_facts(options.stack, stack.header());
+}
+
+/// Returns what is wrong with the pixel size of a header that has no usable one.
+std::string fault_of_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& stack) {
+  const auto facts = facts_of(options, stack);
+  if (!facts || (facts->voxel_size_A[0] == 0.0 && facts->voxel_size_A[1] == 0.0))
+    return "has no pixel size";
+  return fmt::format("states pixels of {:.6g} × {:.6g} Å, which cannot be", facts->voxel_size_A[0],
+                     facts->voxel_size_A[1]);
+}
+
+/// Throws Error unless the pixels of a stack are square, or none of their sides is known.
+void require_square_pixels(const io::ImageStack& stack) {
+  const auto& [width_A, height_A, depth_A] = stack.header().voxel_size_A;
+  if (!(std::fabs(width_A - height_A) > 0.001 * std::fabs(std::max(width_A, height_A)))) return;
+  throw Error(
+      fmt::format("'{}' has pixels of {:.6g} × {:.6g} Å{}, and only square ones can be "
+                  "reconstructed: give their size "
+                  "with --pixel-size if the header is wrong",
+                  stack.name(), width_A, height_A,
+                  std::min(width_A, height_A) == 0.0 ? " (0: none, or one that cannot be)" : ""));
+}
+
+void warn_of_sections_beyond(const TiltSeriesOptions& options, const io::ImageStack& stack) {
+  const auto facts = facts_of(options, stack);
+  if (!facts || facts->sections_beyond == 0) return;
+  base::log_warning(fmt::format(
+      "'{}' is longer than its header states: after the {} sections there is room for {} more, "
+      "which are not read (is the header right?)",
+      stack.name(), stack.header().nz, facts->sections_beyond));
+}
+
 /// Returns the size of an unbinned pixel in Å: --pixel-size, else the header's, else the mdoc's.
 double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& stack,
                        const std::optional<io::Mdoc>& mdoc) {
@@ -160,13 +198,8 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& s
                             *options.pixel_size_A, base::kPixelSizes_A.low(),
                             base::kPixelSizes_A.high()));
   }
-  const auto& [in_header_A, height_A, depth_A] = stack.header().voxel_size_A;
-  if (height_A > 0.0 && std::fabs(in_header_A - height_A) > 0.001 * std::fabs(in_header_A))
-    throw Error(
-        fmt::format("'{}' has pixels of {:.6g} × {:.6g} Å, and only square ones can be "
-                    "reconstructed: give their size "
-                    "with --pixel-size if the header is wrong",
-                    stack.name(), in_header_A, height_A));
+  require_square_pixels(stack);
+  const double in_header_A = stack.header().voxel_size_A[0];
   const bool is_default = in_header_A == 0.0 || in_header_A == 1.0;
   if (is_default && mdoc) {
     const double stated_A = pixel_size_of_mdoc(*mdoc, *options.mdoc, stack);
@@ -179,7 +212,7 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& s
   }
   base::log_warning(fmt::format(
       "'{}' {}; 1 Å is assumed (give it with --pixel-size)", stack.name(),
-      in_header_A == 0.0 ? "has no pixel size"
+      in_header_A == 0.0 ? fault_of_pixel_size(options, stack)
                          : "states pixels of 1 Å, as programs write that do not know their size"));
   return 1.0;
 }
@@ -326,6 +359,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
     if (options.tilt_axis_deg)
       warn_of_given_axis(*options.tilt_axis_deg, axis_of_files(options, stack, table, mdoc));
     if (options.starts_raw && !axis && !alignment) warn_of_unknown_axis(stack);
+    warn_of_sections_beyond(options, stack);
   }
 
   plan.angle_source = angles.source;
@@ -343,7 +377,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
   TiltAngles tilts = angles;
   for (auto& tilt : tilts.of_section)
     if (tilt) tilt->value += options.tilt_offset_deg;
-  require_usable_tilts(tilts, sections);
+  require_usable_tilts(tilts, sections, stack);
   FileMotion motion(options, stack, table, plan.pixel_size_A, size);
   for (const std::int64_t section : sections) {
     const auto at = static_cast<std::size_t>(section);

@@ -68,7 +68,8 @@ std::string describe_steep(const TiltAngles& angles, const std::vector<std::int6
       kLargestTilt_deg, is_one ? "it" : "them", is_one ? "" : "s", io::section_list(steep));
 }
 
-void require_different(const TiltAngles& angles, std::span<const std::int64_t> sections) {
+void require_different(const TiltAngles& angles, std::span<const std::int64_t> sections,
+                       const io::ImageStack& stack) {
   constexpr double kLeastSpan_deg = 0.1;  // stages are less exact
   if (sections.size() < 2) return;
   const auto [low, high] = std::ranges::minmax(sections, {}, [&](std::int64_t section) {
@@ -78,10 +79,10 @@ void require_different(const TiltAngles& angles, std::span<const std::int64_t> s
   const double highest = angles.of_section[static_cast<std::size_t>(high)]->value;
   if (highest - lowest >= kLeastSpan_deg) return;
   throw Error(fmt::format(
-      "'{}': the tilts of all {} sections are {:.6g}°{}, which is no tilt series: give the file of "
-      "the tilt angles with --tlt",
+      "'{}': the tilts of all {} sections are {:.6g}°{}, which is no tilt series: give {}",
       angles.source, sections.size(), lowest + 0.0,
-      highest > lowest ? fmt::format(" to {:.6g}°", highest) : ""));
+      highest > lowest ? fmt::format(" to {:.6g}°", highest) : "",
+      stack.is_in_memory() ? "the tilt angles" : "the file of the tilt angles with --tlt"));
 }
 
 }  // namespace
@@ -125,7 +126,8 @@ TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::ImageSta
   return angles;
 }
 
-void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t> sections) {
+void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t> sections,
+                          const io::ImageStack& stack) {
   std::vector<std::int64_t> missing, unusable, steep;
   for (const std::int64_t section : sections) {
     const auto& angle = angles.of_section[static_cast<std::size_t>(section)];
@@ -145,7 +147,7 @@ void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t
   }
   if (!unusable.empty()) throw Error(describe_unusable(angles, unusable));
   if (!steep.empty()) throw Error(describe_steep(angles, steep));
-  require_different(angles, sections);
+  require_different(angles, sections, stack);
 }
 
 }  // namespace tomofield::tilt_series

@@ -37,6 +37,7 @@ void require_count(std::size_t found, const std::filesystem::path& file, const c
 
 /// Throws Error that names all of these sections at once whose angle is missing or beyond ±80°
 /// (file, line, value), or if the angles of several sections are all the same.
-void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t> sections);
+void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t> sections,
+                          const io::ImageStack& stack);
 
 }  // namespace tomofield::tilt_series

@@ -234,6 +234,35 @@ def test_a_pixel_size_of_1_A_is_not_taken_in_silence():
     assert "--pixel-size" not in dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--pixel-size", 1)
 
 
+@pytest.mark.parametrize("cell, parts", [
+    ((720, 0), ["10 × 0 Å", "--pixel-size"]),
+    ((0, 560), ["0 × 10 Å", "--pixel-size"]),
+    ((720, -560), ["10 × 0 Å", "--pixel-size"]),
+    ((-720, -560), ["warning", "states pixels of -10 × -10 Å", "1 Å is assumed"]),
+    ((np.inf, np.inf), ["warning", "states pixels of inf × inf Å"]),
+    ((7.2e30, 5.6e30), ["warning", "states pixels of 1e+29 × 1e+29 Å"]),
+    ((0, 0), ["warning", "has no pixel size"])])
+def test_a_pixel_size_that_cannot_be_is_said(cell, parts):
+    folder = write_series("cell")
+    with open(os.path.join(folder, "TS_01.mrc"), "r+b") as file:
+        file.seek(40)
+        file.write(np.array([*cell, 10], "<f4").tobytes())
+    refused = "warning" not in parts
+    files = ["TS_01.mrc", "--tlt", "TS_01.rawtlt"]
+    expect(dry(folder, *files, status=2 if refused else 0), "TS_01.mrc", *parts)
+    assert "states pixels" not in dry(folder, *files, "--pixel-size", 10)
+
+
+def test_a_stack_that_is_longer_than_its_header_says():
+    folder = write_series("long")
+    files = ["TS_01.mrc", "--tlt", "TS_01.rawtlt"]
+    for count, is_said in ((100, False), (4 * 72 * 56 * 2, True)):  # bytes; two sections
+        with open(os.path.join(folder, "TS_01.mrc"), "ab") as file:
+            file.write(b"\0" * count)
+        assert ("'TS_01.mrc' is longer" in dry(folder, *files)) == is_said
+    expect(dry(folder, *files), "after the 15 sections", "room for 2 more")
+
+
 def test_a_series_of_relion_that_is_not_aligned_yet():
     folder = write_series("nominal", 85.3, stack="TS_01.mrcs")
     rows = "".join(f"{i + 1:06}@TS_01.mrcs {tilt:.2f} 85.3\n" for i, tilt in enumerate(TILTS))

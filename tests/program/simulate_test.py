@@ -518,6 +518,8 @@ def test_bad_options_are_named_and_nothing_is_written():
         (["--tilts", "-85:85:5"], "80"),
         (["--size", "0"], "size"),
         (["--size", "many"], "size"),
+        (["--voxel-size", "1e300"], "0.001 to 10000000"),
+        (["--voxel-size", "1e-20"], "0.001 to 10000000"),
         (["--noise", "-1"], "noise"),
         (["--noise", "nan"], "noise"),
         (["--dose", "0"], "dose"),

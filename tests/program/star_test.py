@@ -237,6 +237,19 @@ def test_a_name_that_two_rows_have_is_refused(relion):
     assert result.returncode == 2 and "several rows" in result.stderr, result.stderr
 
 
+@pytest.mark.parametrize("hand", ("0.5", "0", "-2"))
+def test_a_hand_that_is_none_is_refused(relion, hand):
+    path = relion.path("Tomograms/job009/hand.star")
+    with open(relion.star, encoding="utf-8") as file:
+        text = file.read()
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text.replace("1.00000", hand))
+    result = harness.tomofield("reconstruct", path, "--series", "TS_01", "--dry-run", cwd=relion.folder)
+    assert result.returncode == 2, result
+    for word in ("hand.star", "TS_01", "rlnTomoHand", hand):
+        assert word in result.stderr, (word, result.stderr)
+
+
 def test_one_series_has_no_name_to_choose(relion):
     views = relion.path("Tomograms/job009/tilt_series/TS_01.star")
     result = harness.tomofield("reconstruct", views, "--series", "TS_02", "-o", relion.path("no.mrc"),

@@ -90,6 +90,16 @@ def test_a_folder_of_something_else_stays(finished, name):
     assert os.listdir(folder + ".zarr") == [name] and not os.path.exists(folder + ".mrc")
 
 
+def test_a_link_to_a_store_is_called_one(finished):
+    path = os.path.join(harness.SCRATCH, "linked")
+    command = ["export", finished.model_path, "--zarr", "--overwrite", "-o"]
+    harness.succeed(*command, path + ".mrc")
+    os.symlink(path + ".zarr", path + "_2.zarr")
+    refused = harness.tomofield(*command, path + "_2.mrc")
+    assert refused.returncode == 2 and "linked_2.zarr': it is a symbolic link" in refused.stderr
+    assert os.path.islink(path + "_2.zarr")
+
+
 @pytest.mark.parametrize("version", ("0.4", "0.5"))
 def test_a_store_into_which_others_put_something_stays(finished, version):
     """Viewers write labels into the store that they show."""

@@ -124,12 +124,16 @@ void require_axis_order(const Fields& fields, const std::string& name) {
       name, axes[0], axes[1], axes[2]));
 }
 
-// Returns cell length over number of samples, never rounded; 0 if the header has none, or one that
-// cannot be.
-double decode_voxel_size(const Fields& fields, std::size_t axis) {
+// Returns cell length over number of samples, never rounded; 0 without samples.
+double stated_size_A(const Fields& fields, std::size_t axis) {
   const double cell_A = fields.float32(kCell + 4 * axis);
   const auto samples = static_cast<double>(fields.int32(kSampling + 4 * axis));
-  const double size_A = samples > 0 ? cell_A / samples : 0.0;
+  return samples > 0 ? cell_A / samples : 0.0;
+}
+
+// Returns the size that the header states; 0 if it has none, or one that cannot be.
+double decode_voxel_size(const Fields& fields, std::size_t axis) {
+  const double size_A = stated_size_A(fields, axis);
   return base::is_plausible_pixel_size(size_A) ? size_A : 0.0;
 }
 
@@ -219,6 +223,16 @@ MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name
     for (double& origin_A : header.origin_A) origin_A = origin_A == 0.0 ? 0.0 : -origin_A;
   }
   return header;
+}
+
+std::optional<std::array<double, 3>> stated_voxel_size_A(const MrcHeaderBytes& bytes,
+                                                         const MrcHeader& header) {
+  const Fields fields(bytes, header.is_byte_swapped);
+  const bool is_its = fields.int32(kSize) == header.nx && fields.int32(kSize + 4) == header.ny &&
+                      fields.int32(kSize + 8) == header.nz &&
+                      fields.int32(kMode) == static_cast<std::int32_t>(header.mode);
+  if (!is_its) return std::nullopt;
+  return std::array{stated_size_A(fields, 0), stated_size_A(fields, 1), stated_size_A(fields, 2)};
 }
 
 std::int64_t expected_file_bytes(const MrcHeader& header, const std::string& name) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,6 +32,11 @@ MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name
 
 /// Returns the bytes that a file with this header has. Throws Error if 63 bits cannot hold them.
 std::int64_t expected_file_bytes(const MrcHeader& header, const std::string& name);
+
+/// Returns the sides of a voxel as a file states them, whether or not they can be: cell lengths
+/// over numbers of samples, 0 without samples. Returns nothing if the bytes are of another header.
+std::optional<std::array<double, 3>> stated_voxel_size_A(const MrcHeaderBytes& bytes,
+                                                         const MrcHeader& header);
 
 /// Returns the fixed header of a new file, little-endian, without an extended one.
 MrcHeaderBytes encode_mrc_header(const MrcHeader& header);

@@ -17,6 +17,12 @@ void require_replaceable_folder(const fs::path& path, const fs::path& marker) {
   std::error_code absent;
   const fs::file_status status = fs::symlink_status(path, absent);
   if (!fs::exists(status)) return;
+  if (fs::is_symlink(status)) {
+    throw Error(
+        fmt::format("cannot replace '{}': it is a symbolic link, and links are not "
+                    "replaced; give the name that it points to, or move it away",
+                    path.string()));
+  }
   if (fs::is_directory(status) && fs::is_regular_file(path / marker, absent)) return;
   throw Error(
       fmt::format("cannot replace '{}': it is no folder of such results (it has no '{}'); "

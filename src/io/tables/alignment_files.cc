@@ -32,6 +32,22 @@ bool is_plausible_matrix(const ImodTransform& t) {
   return determinant > 0 && largest <= kLargestStretch && determinant >= largest / kLargestStretch;
 }
 
+bool is_mirror(const ImodTransform& t) { return t.a11 * t.a22 - t.a12 * t.a21 < 0.0; }
+
+// Throws Error if some transforms mirror the images and others do not: the views of a series are
+// all mirrored or none. `lines` are those of the transforms.
+void require_one_hand(const std::filesystem::path& path, const std::vector<TextLine>& lines,
+                      const std::vector<ImodTransform>& transforms) {
+  const auto num_mirrors = std::ranges::count_if(transforms, is_mirror);
+  const bool are_few = 2 * num_mirrors <= std::ssize(transforms);
+  for (std::size_t i = 0; i < transforms.size(); ++i) {
+    if (is_mirror(transforms[i]) != are_few) continue;
+    throw_line_error(path, lines[i],
+                     fmt::format("of one series with the others: it {} the image, and most do {}",
+                                 are_few ? "mirrors" : "does not mirror", are_few ? "not" : "so"));
+  }
+}
+
 constexpr std::string_view kForm =
     "a tilt angle, alone, or with its place in the order of recording and its dose, as in AreTomo "
     "3's "
@@ -86,7 +102,8 @@ TiltTable read_tilt_table(const std::filesystem::path& path) {
 
 std::vector<ImodTransform> read_imod_transforms(const std::filesystem::path& path) {
   std::vector<ImodTransform> transforms;
-  for (const TextLine& line : read_text_lines(path)) {
+  const std::vector<TextLine> lines = read_text_lines(path);
+  for (const TextLine& line : lines) {
     const auto words = split_words(line.text);
     std::array<double, 6> values{};
     bool is_valid = words.size() == values.size();
@@ -105,6 +122,7 @@ std::vector<ImodTransform> read_imod_transforms(const std::filesystem::path& pat
                        "by less than 0.01 or more than 100");
     }
   }
+  require_one_hand(path, lines, transforms);
   return transforms;
 }
 

@@ -70,8 +70,21 @@ TEST(ImodTransforms, ReadsSixNumbersALine) {
 
 TEST(ImodTransforms, ReadsMirrorsAndChangesOfScale) {
   const ScratchDirectory scratch;
-  const auto path = scratch.write("a.xf", "-1 0 0 1 0 0\n4 0 0 4 0 0\n0.25 0 0 0.3 9999 0\n");
+  const auto path = scratch.write("a.xf", "1 0 0 1 0 0\n4 0 0 4 0 0\n0.25 0 0 0.3 9999 0\n");
   EXPECT_EQ(read_imod_transforms(path).size(), 3u);
+  const auto mirrors = scratch.write("b.xf", "-1 0 0 1 0 0\n-4 0 0 4 0 0\n");
+  EXPECT_EQ(read_imod_transforms(mirrors).size(), 2u);
+}
+
+TEST(ImodTransforms, RefuseALineThatMirrorsAmongOthers) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::string& text) {
+    const auto path = scratch.write("a.xf", text);
+    return message_of<Error>([&] { read_imod_transforms(path); });
+  };
+  const std::string plain = "1 0 0 1 0 0\n", mirror = "-1 0 0 1 0 0\n";
+  expect_parts(refusal(plain + mirror + plain), {"a.xf', line 2", "-1 0 0 1 0 0", "mirrors"});
+  expect_parts(refusal(mirror + mirror + plain), {"a.xf', line 3", "does not mirror"});
 }
 
 TEST(ImodTransforms, RefusesMalformedLines) {
@@ -224,6 +237,8 @@ TEST(AreTomoAlignment, RefusesMalformedRows) {
       {"99999999999 85 1 0 0 0 0 0 0 10", "99999999999 85"},
       {"0 85 1 0 0 0 0 0 0 steep", "TILT of AreTomo's row is 'steep'"},
       {"0 1e300 1 0 0 0 0 0 0 10", "ROT of AreTomo's row is '1e300'"},
+      {"0 85 0 0 0 0 0 0 0 10", "GMAG of AreTomo's row is '0'"},
+      {"0 85 -1 0 0 0 0 0 0 10", "GMAG of AreTomo's row is '-1'"},
       {"0 85 1 1e300 0 0 0 0 0 10", "TX of AreTomo's row is '1e300'"},
       {"0 85 1 0 0 0 0 0 0 inf", "TILT of AreTomo's row is 'inf'"}};
   for (const auto& [bad, part] : rows) {
@@ -382,6 +397,16 @@ TEST(Mdoc, ReadsTheMicroscope) {
   EXPECT_EQ(*mdoc.image_size_px, (std::array<std::int64_t, 2>{1440, 1023}));
   EXPECT_EQ(mdoc.sections[0].tilt_deg, 3.0);
   EXPECT_FALSE(read_mdoc(scratch.write("a.mdoc", "Voltage = 0\n[ZValue = 0]\n")).voltage_kV);
+}
+
+TEST(Mdoc, RefusesAPixelSizeThatCannotBe) {
+  const ScratchDirectory scratch;
+  const auto read = [&](const std::string& size) {
+    return read_mdoc(scratch.write("a.mdoc", "[ZValue = 0]\nPixelSpacing = " + size + "\n"));
+  };
+  EXPECT_EQ(read("0").pixel_spacing_A, 0.0);  // not known
+  for (const char* bad : {"-10", "1e-30", "1e8"})
+    expect_parts(message_of<Error>([&] { read(bad); }), {"a.mdoc", "line 2", "PixelSpacing"});
 }
 
 TEST(Mdoc, ReadsTheDefocusThatTheSessionAimedAt) {

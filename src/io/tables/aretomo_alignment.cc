@@ -68,10 +68,11 @@ void parse_header_line(const std::filesystem::path& path, const TextLine& line,
 struct Column {
   std::string_view name;
   std::size_t index;
-  double largest;
+  base::Interval within;
 };
+constexpr base::Interval kMagnifications{0.01, 100.0};
 constexpr std::array<Column, 5> kUsedColumns{{{"ROT", 1, base::kLargestAngle_deg},
-                                              {"GMAG", 2, base::kLargestNumber},
+                                              {"GMAG", 2, kMagnifications},
                                               {"TX", 3, base::kLargestPosition_px},
                                               {"TY", 4, base::kLargestPosition_px},
                                               {"TILT", 9, base::kLargestAngle_deg}}};
@@ -86,14 +87,14 @@ AreTomoRow parse_row(const std::filesystem::path& path, const TextLine& line, bo
   }
   std::array<double, kUsedColumns.size()> used{};
   for (std::size_t i = 0; i < used.size(); ++i) {
-    const auto& [name, index, largest] = kUsedColumns[i];
-    const auto number = parse_number(words[index], largest);
+    const auto& [name, index, within] = kUsedColumns[i];
+    const auto number = parse_number(words[index], within);
     if (!number && (needs_tilt || name != "TILT")) {
       throw Error(
           fmt::format("'{}', line {}: the column {} of AreTomo's row is '{}', and a number from "
-                      "-{:g} to {:g} is "
+                      "{:g} to {:g} is "
                       "expected{}",
-                      path.string(), line.number, name, words[index], largest, largest,
+                      path.string(), line.number, name, words[index], within.low(), within.high(),
                       name == "TILT" ? ": correct it, or give the angles with --tlt" : ""));
     }
     used[i] = number ? double{*number} : 0.0;

@@ -76,6 +76,18 @@ std::optional<double> parse_voltage_kV(const std::filesystem::path& path, const 
                           line.number, voltage_kV));
 }
 
+// Returns a pixel size, or 0 if it is not known. Throws Error for one that cannot be.
+double require_spacing_A(const std::filesystem::path& path, const TextLine& line,
+                         std::string_view word) {
+  const double spacing_A = require_number(path, line, word, base::kLargestNumber);
+  if (spacing_A == 0.0 || base::is_plausible_pixel_size(spacing_A)) return spacing_A;
+  throw Error(
+      fmt::format("'{}', line {}: PixelSpacing is {} Å, and pixels have {} to {} Å: correct "
+                  "it, or write 0 if the size is not known",
+                  path.string(), line.number, spacing_A, base::kPixelSizes_A.low(),
+                  base::kPixelSizes_A.high()));
+}
+
 // Reads two whole numbers, as of ImageSize.
 std::optional<std::array<std::int64_t, 2>> parse_size(std::string_view text) {
   const auto words = split_words(text);
@@ -220,7 +232,7 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
     }
     const KeyValue entry = split_key_value(line.text);
     if (entry.key == "PixelSpacing") {
-      const double spacing_A = require_number(path, line, entry.value, base::kLargestNumber);
+      const double spacing_A = require_spacing_A(path, line, entry.value);
       if (!mdoc.pixel_spacing_A) mdoc.pixel_spacing_A = spacing_A;
       if (is_in_section) mdoc.sections.back().pixel_spacing_A = spacing_A;
     } else if (entry.key == "TiltAxisAngle") {

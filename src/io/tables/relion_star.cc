@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "io/tables/ctf_table.h"
+#include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -13,15 +15,26 @@ namespace {
 constexpr double kLargestShift_A = base::kLargestPosition_px;
 constexpr const char* kNominalTilt = "rlnTomoNominalStageTiltAngle";
 
-std::optional<std::array<std::int64_t, 3>> size_of(const StarRow& row) {
-  std::array<std::int64_t, 3> size{};
+// Returns the size of the tomogram. RELION writes three zeros for those that are not reconstructed
+// yet, once a table has the columns (MetaDataTable::addLabel).
+std::optional<std::array<std::int64_t, 3>> size_of(const StarRow& row, const std::string& where) {
   constexpr std::array kColumns{"rlnTomoSizeX", "rlnTomoSizeY", "rlnTomoSizeZ"};
-  for (std::size_t axis = 0; axis < size.size(); ++axis) {
-    const auto pixels = row.find_number(kColumns[axis], base::kLargestPosition_px);
-    if (!pixels || *pixels < 1) return std::nullopt;
-    size[axis] = static_cast<std::int64_t>(*pixels);
+  std::array<double, 3> pixels{};
+  for (std::size_t axis = 0; axis < pixels.size(); ++axis) {
+    const auto found = row.find_number(kColumns[axis], base::kLargestPosition_px);
+    if (!found) return std::nullopt;
+    pixels[axis] = *found;
   }
-  return size;
+  if (pixels == std::array{0.0, 0.0, 0.0}) return std::nullopt;
+  for (std::size_t axis = 0; axis < pixels.size(); ++axis) {
+    if (pixels[axis] >= 1 && pixels[axis] == std::floor(pixels[axis])) continue;
+    throw Error(
+        fmt::format("{}: _{} is {}, and a tomogram has a whole number of pixels, at least 1: "
+                    "correct it, or remove the columns of the size",
+                    where, kColumns[axis], pixels[axis]));
+  }
+  return std::array{static_cast<std::int64_t>(pixels[0]), static_cast<std::int64_t>(pixels[1]),
+                    static_cast<std::int64_t>(pixels[2])};
 }
 
 std::optional<Defocus> defocus_of(const StarRow& row) {
@@ -29,9 +42,11 @@ std::optional<Defocus> defocus_of(const StarRow& row) {
   if (!u_A) return std::nullopt;
   Defocus defocus;
   defocus.u_A = *u_A;
-  defocus.v_A = row.find_number("rlnDefocusV", kLargestDefocus_A).value_or(*u_A);
-  defocus.angle_deg = row.find_number("rlnDefocusAngle", base::kLargestAngle_deg).value_or(0.0);
-  defocus.phase_shift_deg = row.find_number("rlnPhaseShift", base::kLargestAngle_deg).value_or(0.0);
+  defocus.v_A = row.find_stated_number("rlnDefocusV", kLargestDefocus_A).value_or(*u_A);
+  defocus.angle_deg =
+      row.find_stated_number("rlnDefocusAngle", base::kLargestAngle_deg).value_or(0.0);
+  defocus.phase_shift_deg =
+      row.find_stated_number("rlnPhaseShift", base::kLargestAngle_deg).value_or(0.0);
   return defocus;
 }
 
@@ -78,15 +93,17 @@ ListedView view_of(const StarRow& row, bool is_nominal) {
   if (is_nominal) {
     view.tilt_deg = row.number(kNominalTilt, base::kLargestAngle_deg);
     view.rotation_deg =
-        row.find_number("rlnTomoNominalTiltAxisAngle", base::kLargestAngle_deg).value_or(0.0);
+        row.find_stated_number("rlnTomoNominalTiltAxisAngle", base::kLargestAngle_deg)
+            .value_or(0.0);
   } else {
     view.tilt_deg = row.number("rlnTomoYTilt", base::kLargestAngle_deg);
-    view.x_tilt_deg = row.find_number("rlnTomoXTilt", base::kLargestAngle_deg).value_or(0.0);
+    view.x_tilt_deg = row.find_stated_number("rlnTomoXTilt", base::kLargestAngle_deg).value_or(0.0);
     view.rotation_deg = row.number("rlnTomoZRot", base::kLargestAngle_deg);
     view.shift_x_A = row.number("rlnTomoXShiftAngst", kLargestShift_A);
     view.shift_y_A = row.number("rlnTomoYShiftAngst", kLargestShift_A);
   }
   view.dose_before = row.find_dose("rlnMicrographPreExposure");
+  row.find_stated_number("rlnDefocusU", kLargestDefocus_A);  // throws Error for None
   view.defocus = defocus_of(row);
   return view;
 }
@@ -115,7 +132,8 @@ RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
     tomogram.pixel_size_A = row.find_number("rlnTomoTiltSeriesPixelSize");
     tomogram.hand = row.find_number("rlnTomoHand");
     tomogram.optics = optics_by([&](const char* column) { return row.find_number(column); });
-    tomogram.size_px = size_of(row);
+    tomogram.size_px =
+        size_of(row, fmt::format("'{}', tomogram {}", path.string(), quote(tomogram.name)));
     all.tomograms.push_back(std::move(tomogram));
   }
   if (all.tomograms.empty())

@@ -146,10 +146,11 @@ std::optional<std::string> StarRow::find_text(std::string_view column) const {
 }
 
 std::string StarRow::text(std::string_view column) const {
-  if (const auto value = find_text(column)) return *value;
-  throw Error(table_.has_column(column) ? fmt::format("{}: _{} is empty", where(), column)
-                                        : fmt::format("'{}': the table 'data_{}' has no column _{}",
-                                                      path_.string(), table_.name(), column));
+  if (const auto found = find_text(column)) return *found;
+  const auto value = table_.find(row_, column);
+  throw Error(value ? fmt::format("{}: _{} is empty ('{}')", where(), column, *value)
+                    : fmt::format("'{}': the table 'data_{}' has no column _{}", path_.string(),
+                                  table_.name(), column));
 }
 
 std::optional<double> StarRow::find_number(std::string_view column, double largest) const {
@@ -161,9 +162,13 @@ std::optional<double> StarRow::find_number(std::string_view column, double large
                           quote(*value), column, largest, largest));
 }
 
+std::optional<double> StarRow::find_stated_number(std::string_view column, double largest) const {
+  return table_.has_column(column) ? std::optional(number(column, largest)) : std::nullopt;
+}
+
 std::optional<double> StarRow::find_dose(std::string_view column) const {
   constexpr double kLargestDose = 1e6;
-  const auto dose = find_number(column, kLargestDose);
+  const auto dose = find_stated_number(column, kLargestDose);
   if (!dose || *dose >= 0.0) return dose;
   throw Error(fmt::format("{}: the dose {} in the column _{} is negative", where(), *dose, column));
 }

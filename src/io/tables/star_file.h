@@ -66,8 +66,12 @@ class StarRow {
   /// Returns a number, or nothing if there is no such column, or if its value stands for nothing.
   std::optional<double> find_number(std::string_view column,
                                     double largest = base::kLargestNumber) const;
-  /// Returns the dose of a column, nothing if the column is not there. Throws Error for a negative
-  /// one too.
+  /// Returns the number in a column that a table has whole or not at all, or nothing if there is no
+  /// such column. Throws Error for a value that stands for nothing.
+  std::optional<double> find_stated_number(std::string_view column,
+                                           double largest = base::kLargestNumber) const;
+  /// Returns the dose of a column, as find_stated_number() does. Throws Error for a negative one
+  /// too.
   std::optional<double> find_dose(std::string_view column) const;
 
  private:

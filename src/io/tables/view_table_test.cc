@@ -1,5 +1,6 @@
 #include "io/tables/view_table.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "expect_parts.h"
@@ -90,6 +91,55 @@ TEST(RelionTomograms, AreReadWithTheirColumns) {
                {"TS_01.star", "rlnTomoTiltSeriesStarFile"});
 }
 
+// RELION writes three zeros for tomograms that are not reconstructed yet.
+TEST(RelionTomograms, HaveSizesOfWholePixelsOrNone) {
+  const ScratchDirectory scratch;
+  const auto size_of = [&](const std::string& size) {
+    const auto path = scratch.write(
+        "tomograms.star",
+        "data_global\nloop_\n_rlnTomoName #1\n_rlnTomoTiltSeriesStarFile #2\n_rlnTomoSizeX #3\n"
+        "_rlnTomoSizeY #4\n_rlnTomoSizeZ #5\nTS_01 t/TS_01.star " +
+            size + "\n");
+    return read_relion_tomograms(path).tomograms[0].size_px;
+  };
+  EXPECT_EQ(size_of("0 0 0"), std::nullopt);
+  EXPECT_EQ(size_of("64 48 24.0"), (std::array<std::int64_t, 3>{64, 48, 24}));
+  for (const auto& [size, column] : {std::pair("64 48 -5", "rlnTomoSizeZ"),
+                                     {"64 48 0", "rlnTomoSizeZ"},
+                                     {"64 48 2.5", "rlnTomoSizeZ"},
+                                     {"-64 48 20", "rlnTomoSizeX"},
+                                     {"64 0.5 20", "rlnTomoSizeY"}})
+    expect_parts(message_of<Error>([&] { size_of(size); }), {"tomograms.star", "TS_01", column});
+}
+
+TEST(ViewTable, RefusesTextInPlaceOfANumber) {
+  const ScratchDirectory scratch;
+  const std::vector<std::string> good{"a.mrc", "None", "0", "-60", "85", "0",
+                                      "0",     "3",    "4", "4",   "45", "0"};
+  const std::vector<std::string> names{"rlnTomoXTilt",       "rlnTomoYTilt",
+                                       "rlnTomoZRot",        "rlnTomoXShiftAngst",
+                                       "rlnTomoYShiftAngst", "rlnMicrographPreExposure",
+                                       "rlnDefocusU",        "rlnDefocusV",
+                                       "rlnDefocusAngle",    "rlnPhaseShift"};
+  const auto refusal = [&](const std::vector<std::string>& words) {
+    std::string row;
+    for (const std::string& word : words) row += word + " ";
+    return refusal_of_views(scratch.write("TS.star", kRelionHead + row + "\n"));
+  };
+  EXPECT_EQ(refusal(good), "");
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    for (const char* bad : {"None", "many"}) {
+      std::vector<std::string> words = good;
+      words[i + 2] = bad;
+      expect_parts(refusal(words), {"TS.star", "row 1", names[i], bad});
+    }
+  }
+  expect_parts(refusal_of_views(scratch.write("TS.tomostar",
+                                              "\ndata_\n\nloop_\n_wrpMovieName #1\n"
+                                              "_wrpAngleTilt #2\n_wrpDose #3\na.eer 45 None\n")),
+               {"TS.tomostar", "row 1", "wrpDose"});
+}
+
 TEST(ViewTable, ReadsATomostarWithTheSignsOfWarp) {
   const ScratchDirectory scratch;
   const std::string head =
@@ -165,6 +215,31 @@ TEST(ViewTable, KnowsTheHandOfTheDefocusOfWarp) {
   EXPECT_EQ(hand(" AreAnglesInverted=\"True\""), 1);
   EXPECT_EQ(hand(" AreAnglesInverted=\"False\""), -1);
   EXPECT_EQ(hand(""), std::nullopt);
+}
+
+TEST(ViewTable, RefusesFlagsAndSizesOfWarpThatCannotBe) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::string& from, const std::string& to) {
+    std::string xml = kSeriesXml + "</TiltSeries>";
+    xml.replace(xml.find(from), from.size(), to);
+    return refusal_of_views(scratch.write("TS.xml", xml));
+  };
+  const std::string inverted = "AreAnglesInverted=\"True\"", used = "True\nFalse";
+  EXPECT_EQ(refusal(inverted, "AreAnglesInverted=\"true\""), "");
+  EXPECT_EQ(refusal(used, "TRUE\nfalse"), "");
+  expect_parts(refusal(inverted, "AreAnglesInverted=\"yes\""),
+               {"TS.xml", "yes", "AreAnglesInverted"});
+  expect_parts(refusal(used, "True\n0"), {"TS.xml", "'0'", "UseTilt", "view 2"});
+  const auto sizes = [&](const std::string& attribute) {
+    return refusal(inverted, attribute + " " + inverted);
+  };
+  EXPECT_EQ(sizes("VolumeDimensionsAngstrom=\"640, 480, 240\""), "");
+  EXPECT_EQ(sizes("ImageDimensionsAngstrom=\"0, 0\" VolumeDimensionsAngstrom=\"0, 0, 0\""), "");
+  for (const char* bad : {"640, 480, 0", "640, 480, -240", "0, 480, 240", "640, 480", "240"})
+    expect_parts(sizes(fmt::format("VolumeDimensionsAngstrom=\"{}\"", bad)),
+                 {"TS.xml", bad, "VolumeDimensionsAngstrom"});
+  expect_parts(sizes("ImageDimensionsAngstrom=\"640, -480\""),
+               {"TS.xml", "ImageDimensionsAngstrom"});
 }
 
 TEST(ViewTable, ReadsXmlInUtf16) {

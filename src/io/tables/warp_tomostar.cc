@@ -21,9 +21,12 @@ ViewTable read_warp_tomostar(const std::filesystem::path& path) {
     ListedView view;
     view.image = row.text("wrpMovieName");
     view.tilt_deg = -row.number("wrpAngleTilt", base::kLargestAngle_deg);
-    view.rotation_deg = row.find_number("wrpAxisAngle", base::kLargestAngle_deg).value_or(0.0);
-    view.shift_x_A = row.find_number("wrpAxisOffsetX", base::kLargestPosition_px).value_or(0.0);
-    view.shift_y_A = row.find_number("wrpAxisOffsetY", base::kLargestPosition_px).value_or(0.0);
+    view.rotation_deg =
+        row.find_stated_number("wrpAxisAngle", base::kLargestAngle_deg).value_or(0.0);
+    view.shift_x_A =
+        row.find_stated_number("wrpAxisOffsetX", base::kLargestPosition_px).value_or(0.0);
+    view.shift_y_A =
+        row.find_stated_number("wrpAxisOffsetY", base::kLargestPosition_px).value_or(0.0);
     view.dose_before = row.find_dose("wrpDose");
     views.views.push_back(std::move(view));
   }

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <optional>
 #include <pugixml.hpp>
@@ -14,8 +15,6 @@
 
 namespace tomofield::io {
 namespace {
-
-bool parse_flag(std::string_view text) { return text != "False" && text != "false"; }
 
 // Warp's XML file of a tilt series. Elements hold one value a line, one line a view.
 class WarpXml {
@@ -65,6 +64,16 @@ class WarpXml {
                             count, num_views));
   }
 
+  // Parses a flag, in upper or lower case.
+  bool parse_flag(std::string_view text, std::string_view what) const {
+    std::string word(text);
+    std::ranges::transform(word, word.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (word == "true" || word == "false") return word == "true";
+    throw Error(fmt::format("'{}': '{}' in {} is neither True nor False: correct it",
+                            path_.string(), quote(text), what));
+  }
+
   // Returns an attribute of the series, or 0.
   double attribute(const char* name) const {
     const char* const text = root_.attribute(name).value();
@@ -77,17 +86,28 @@ class WarpXml {
   std::optional<int> defocus_hand() const {
     const std::string_view inverted = root_.attribute("AreAnglesInverted").value();
     if (inverted.empty()) return std::nullopt;
-    return parse_flag(inverted) ? 1 : -1;
+    return parse_flag(inverted, "AreAnglesInverted") ? 1 : -1;
   }
 
-  // Returns the last of "x, y, z", the size of the volume, which older versions do not write.
-  std::optional<double> thickness_A() const {
-    const std::string_view sizes = root_.attribute("VolumeDimensionsAngstrom").value();
-    const std::size_t comma = sizes.rfind(',');
-    if (comma == std::string_view::npos) return std::nullopt;
-    const double size_A =
-        parse("VolumeDimensionsAngstrom", sizes.substr(comma + 1), base::kLargestPosition_px);
-    return size_A > 0 ? std::optional(size_A) : std::nullopt;
+  // Returns the sizes "x, y, z" in an attribute. Nothing if it is not there, as in older versions,
+  // or if all are 0, as before anything was reconstructed.
+  std::optional<std::vector<double>> dimensions_A(const char* name, std::size_t count) const {
+    std::string_view text = root_.attribute(name).value();
+    if (trim(text).empty()) return std::nullopt;
+    std::vector<double> sizes_A;
+    for (bool is_last = false; !is_last;) {
+      const std::size_t comma = std::min(text.find(','), text.size());
+      sizes_A.push_back(parse(name, text.substr(0, comma), base::kLargestPosition_px));
+      is_last = comma == text.size();
+      text.remove_prefix(std::min(comma + 1, text.size()));
+    }
+    const auto is_unknown = [](double size_A) { return size_A == 0.0; };
+    if (sizes_A.size() == count && std::ranges::all_of(sizes_A, is_unknown)) return std::nullopt;
+    if (sizes_A.size() == count && std::ranges::min(sizes_A) > 0.0) return sizes_A;
+    throw Error(
+        fmt::format("'{}': '{}' in {} are not {} sizes above 0 Å: correct them, or remove "
+                    "the attribute",
+                    path_.string(), quote(root_.attribute(name).value()), name, count));
   }
 
   // The movements along an axis: the mean of each view, and the largest distance of a node from it.
@@ -266,7 +286,8 @@ ViewTable read_warp_xml(const std::filesystem::path& path) {
   for (std::size_t i = 0; i < num_views; ++i) {
     ListedView view;
     view.image = movies[i];
-    view.is_used = flags.empty() || parse_flag(flags[i]);
+    view.is_used =
+        flags.empty() || xml.parse_flag(flags[i], fmt::format("<UseTilt> of view {}", i + 1));
     view.tilt_deg = -(angles[i] + level_y_deg);
     view.x_tilt_deg = level_x_deg;
     view.rotation_deg = axes[i];
@@ -278,7 +299,9 @@ ViewTable read_warp_xml(const std::filesystem::path& path) {
     view.dose_before = doses[i];
     table.views.push_back(std::move(view));
   }
-  table.thickness_A = xml.thickness_A();
+  if (const auto sizes_A = xml.dimensions_A("VolumeDimensionsAngstrom", 3))
+    table.thickness_A = sizes_A->back();
+  xml.dimensions_A("ImageDimensionsAngstrom", 2);  // throws Error for sizes that cannot be
   apply_movements(xml, table);
   set_defocus(xml, table);
   table.optics = {xml.ctf_parameter("Voltage"), xml.ctf_parameter("Cs"),
