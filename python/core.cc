@@ -14,8 +14,11 @@
 #include <tomofield/version.h>
 #include <tomofield/volume_file.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -23,6 +26,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/nearest_names.h"
+#include "baseline/method_options.h"
 #include "option_table/rows.h"
 #include "options.h"
 #include "unlocked.h"
@@ -34,20 +39,35 @@ namespace py = pybind11;
 template <class Number>
 using Array = py::array_t<Number, py::array::c_style | py::array::forcecast>;
 
+// Calls a function of NumPy with an array and returns what it makes. Throws Error if NumPy raises:
+// it may lack memory, or was told to refuse numbers (np.seterr, python -W error); then `otherwise`
+// says what is wrong.
+template <typename... Arguments>
+py::object numpy_array(const std::string& otherwise, Arguments&&... arguments) {
+  try {
+    return py::module_::import("numpy").attr("asarray")(std::forward<Arguments>(arguments)...);
+  } catch (py::error_already_set& error) {
+    if (!error.matches(PyExc_MemoryError)) throw Error(otherwise);
+    throw Error("there is too little memory for a copy of an array that is computed with: " +
+                std::string(py::str(error.value())));
+  }
+}
+
 // Returns an array of real numbers from whatever NumPy makes one of. All arrays of users pass here:
-// NumPy would drop imaginary parts, and read texts and dates as numbers.
+// NumPy would drop imaginary parts and masks, and read texts and dates as numbers.
 template <class Number>
 Array<Number> numbers_of(const py::object& object) {
-  const auto array = py::array::ensure(object);
-  if (!array) throw Error("an array of numbers is needed");
+  if (py::module_::import("numpy").attr("ma").attr("is_masked")(object).cast<bool>())
+    throw Error(
+        "an array with masked elements says nothing in their places: fill them (numpy.ma.filled), "
+        "or leave them out");
+  const py::array array = numpy_array("an array of numbers is needed", object);
   if (std::string_view("biuf").find(array.dtype().kind()) == std::string_view::npos)
     throw Error("an array of real numbers is needed, not one of type " +
                 py::str(array.dtype()).cast<std::string>());
-  const auto numbers = Array<Number>::ensure(array);
-  if (!numbers)  // NumPy raised, as it was told to (np.seterr, python -W error)
-    throw Error("an array of type " + py::str(array.dtype()).cast<std::string>() +
-                " has numbers that are too large");
-  return numbers;
+  return numpy_array("an array of type " + py::str(array.dtype()).cast<std::string>() +
+                         " has numbers that are too large",
+                     array, py::dtype::of<Number>(), "C");
 }
 
 // Hands a vector over to numpy without a copy.
@@ -253,16 +273,52 @@ py::array_t<float> sample_points(const Model& model, const py::object& rows) {
   const Array<double> points = numbers_of<double>(rows);
   if (points.ndim() != 2 || points.shape(1) != 3)
     throw Error("points are an array of N rows with x, y and z");
-  std::vector<Point> list(static_cast<std::size_t>(points.shape(0)));
-  for (std::size_t i = 0; i < list.size(); ++i)
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      list[i][axis] = points.at(static_cast<py::ssize_t>(i), static_cast<py::ssize_t>(axis));
+  constexpr py::ssize_t kRowsAtOnce = py::ssize_t{1} << 20;
+  std::vector<Point> list;
+  list.reserve(static_cast<std::size_t>(points.shape(0)));
+  for (py::ssize_t i = 0; i < points.shape(0); ++i) {
+    if (i % kRowsAtOnce == 0 && PyErr_CheckSignals() != 0) throw py::error_already_set();
+    list.push_back({*points.data(i, 0), *points.data(i, 1), *points.data(i, 2)});
+  }
   std::vector<float> values;
   {
     const Unlocked unlocked;
     values = model.sample_points(list);
   }
   return to_array(std::move(values), {points.shape(0)});
+}
+
+// Returns what the values of a method's options are, by their names: the kind, and whether they may
+// be "auto".
+std::map<std::string, std::pair<std::string, bool>> method_options(const std::string& method) {
+  std::map<std::string, std::pair<std::string, bool>> kinds;
+  const auto word = [](baseline::ValueKind kind) {
+    switch (kind) {
+      case baseline::ValueKind::kSwitch:
+        return "True or False";
+      case baseline::ValueKind::kWholeNumber:
+        return "a whole number";
+      case baseline::ValueKind::kNumber:
+        return "a number";
+      case baseline::ValueKind::kWord:
+        break;
+    }
+    return "a text";
+  };
+  for (const baseline::MethodOption& option :
+       baseline::options_of(baseline::method_named(method).value()))
+    kinds.emplace(option.flag.substr(2),
+                  std::pair(word(baseline::kind_of(option)), baseline::may_be_open(option)));
+  return kinds;
+}
+
+// Returns the options of the table that a method takes.
+std::vector<std::string> shared_options(const std::string& method) {
+  std::vector<std::string> names;
+  for (const option_table::Row& row : option_table::all_rows())
+    if (baseline::takes_option(baseline::method_named(method).value(), row))
+      names.emplace_back(row.name);
+  return names;
 }
 
 void add_reconstruct(py::module_& module) {
@@ -290,7 +346,14 @@ void add_reconstruct(py::module_& module) {
   module.def("align", &align_series);
   module.def("reconstruct", &run);
   module.def("baseline", &run_baseline);
-  module.def("set_thread_count", &set_thread_count);
+  module.def("method_options", &method_options);
+  module.def("shared_options", &shared_options);
+  module.def("nearest_names", &base::nearest_names);
+  module.def("set_thread_count", [](std::int64_t count) {
+    using Limits = std::numeric_limits<int>;
+    set_thread_count(
+        static_cast<int>(std::clamp<std::int64_t>(count, Limits::min(), Limits::max())));
+  });
 }
 
 void add_model(py::module_& module) {
@@ -360,6 +423,9 @@ void add_evaluate(py::module_& module) {
 PYBIND11_MODULE(_core, module) {
   using namespace tomofield;
   pybind11::register_exception<Error>(module, "Error", PyExc_RuntimeError);
+  module.attr("Error").attr("__doc__") =
+      "A file, an array or an option cannot be used. The sentence says what, where, and what to "
+      "do.";
   module.attr("__version__") = library_version();
   set_message_handler(python::log);
   python::wait_at_exit();

@@ -1,6 +1,7 @@
 #include "unlocked.h"
 
 #include <tomofield/error.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
@@ -28,7 +29,11 @@ Calls& calls() {
   return *all;
 }
 
+// A process that was forked has no other threads: what they began in its parent does not end in it.
+pid_t g_own_process = 0;
+
 void wait_for_calls() {
+  if (getpid() != g_own_process) return;
   const py::gil_scoped_release released;
   std::unique_lock lock(calls().mutex);
   calls().is_over = true;
@@ -73,6 +78,7 @@ bool must_stop() {
 }
 
 void wait_at_exit() {
+  g_own_process = getpid();
   base::set_interruption(interrupt);
   py::module_::import("atexit").attr("register")(py::cpp_function(&wait_for_calls));
 }

@@ -1,7 +1,7 @@
 """What functions take from users: sentences for values of another type."""
 
 import os
-from typing import Any, Dict, Literal, Mapping, Union, get_args, get_origin, get_type_hints
+from typing import Any, Dict, Literal, Mapping, Sequence, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -21,7 +21,8 @@ def path_of(value: object, what: str) -> str:
 
 def number_of(value: object, what: str) -> float:
     """Return a real number."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.number)):
+    if (isinstance(value, (bool, np.bool_))
+            or not isinstance(value, (int, float, np.integer, np.floating))):
         raise TypeError(f"{what} is a number, not {value!r}")
     return float(value)
 
@@ -55,8 +56,12 @@ def chosen(choices: _core.Choices, given: Mapping[str, object]) -> _core.Choices
 
 def no_option(name: str) -> str:
     """Return a sentence with the options that are most like this one, if there are any."""
-    nearest = " or ".join(_core.nearest_options(name))
-    return f"there is no option '{name}'" + (f" (did you mean {nearest}?)" if nearest else "")
+    return f"there is no option '{name}'{suggestion(_core.nearest_options(name))}"
+
+
+def suggestion(nearest: Sequence[str]) -> str:
+    """Return a question in brackets after an unknown name; nothing if no name is like it."""
+    return f" (did you mean {' or '.join(nearest)}?)" if nearest else ""
 
 
 def _kind_of(name: str) -> str:

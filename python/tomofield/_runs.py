@@ -3,12 +3,13 @@
 import html
 import os
 from dataclasses import dataclass, field
-from typing import Any, Dict, List, Literal, Mapping, Optional, Sequence, Tuple, Union, Unpack
+from typing import Any, Dict, List, Literal, Mapping, Optional, Tuple, Union, Unpack
 
+import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._checks import Path, chosen
+from ._checks import Path, chosen, number_of, suggestion, text_of, whole_number_of
 from ._core import Error
 from ._progress import Callback, watched
 from ._projects import Project, Setting, open_project
@@ -78,7 +79,7 @@ class Reconstruction:
         return picture + "".join(f"<p>{html.escape(text)}</p>" for text in texts if text)
 
 
-def reconstruct(source: Source, tilt_deg: Optional[Sequence[float]] = None, *, series: str = "",
+def reconstruct(source: Source, tilt_deg: Optional[npt.ArrayLike] = None, *, series: str = "",
                 progress: Watch = None, **options: Unpack[Options]) -> Reconstruction:
     """Reconstruct a tomogram from a tilt series, with the defaults of the command line.
 
@@ -119,7 +120,7 @@ def denoise(made: Reconstruction, strength: Union[str, float], *, output: Path =
     return _run(settled, core, progress)
 
 
-def baseline(source: Source, method: Method = "wbp", tilt_deg: Optional[Sequence[float]] = None, *,
+def baseline(source: Source, method: Method = "wbp", tilt_deg: Optional[npt.ArrayLike] = None, *,
              method_options: Optional[Mapping[str, MethodOption]] = None, series: str = "",
              progress: Watch = None, **options: Unpack[Options]) -> Reconstruction:
     """Reconstruct by another method, to compare with, as `tomofield baseline` does.
@@ -130,17 +131,18 @@ def baseline(source: Source, method: Method = "wbp", tilt_deg: Optional[Sequence
     method_options: what `tomofield baseline METHOD --help` lists under "Method", and ctf_correction:
         {"iterations": 80, "penalty": "concave", "non_negative": False}.
     The other arguments are those of reconstruct(). With `output`, the tomogram, its metrics and its
-    pictures are written as files. Options of the field have no effect.
+    pictures are written as files. Options of the field and of its fit raise TypeError.
     """
     methods = _core.BaselineMethod.__members__
-    if method not in methods:
+    if text_of(method, "method") not in methods:
         raise Error(f"the method is one of {', '.join(map(repr, methods))}, not {method!r}")
+    unused = [name for name in options
+              if name in Options.__annotations__ and name not in _core.shared_options(method)]
+    if unused:
+        raise TypeError(f"the method '{method}' does not take {', '.join(unused)}: leave "
+                        f"{'it' if len(unused) == 1 else 'them'} out")
+    own = _own_options(method, {} if method_options is None else method_options)
     choices, core = _inputs(source, tilt_deg, series, options)
-    if method_options is not None and not isinstance(method_options, Mapping):
-        raise TypeError("method_options are names with values, as {'iterations': 80}, not "
-                        f"{method_options!r}")
-    own = {str(name).replace("_", "-"): _text_of(value)
-           for name, value in (method_options or {}).items()}
     with watched(progress) as callback:
         made = _core.baseline(core, methods[method], choices, own, callback)
     if not made["is_finished"]:
@@ -149,7 +151,7 @@ def baseline(source: Source, method: Method = "wbp", tilt_deg: Optional[Sequence
                           None, record_of(made["metrics"]))
 
 
-def align(source: Source, tilt_deg: Optional[Sequence[float]] = None, *, series: str = "",
+def align(source: Source, tilt_deg: Optional[npt.ArrayLike] = None, *, series: str = "",
           progress: Watch = None, **options: Unpack[Options]) -> bool:
     """Align the views of a tilt series with each other, as `tomofield align` does.
 
@@ -163,11 +165,43 @@ def align(source: Source, tilt_deg: Optional[Sequence[float]] = None, *, series:
         return _core.align(core, choices, callback)
 
 
-def _text_of(value: MethodOption) -> str:
+def _own_options(method: str, given: Mapping[str, MethodOption]) -> Dict[str, str]:
+    """Return the options of a method as the command line takes them, without dashes before them."""
+    if not isinstance(given, Mapping):
+        raise TypeError("method_options are names with values, as {'iterations': 80}, not "
+                        f"{given!r}")
+    kinds = _core.method_options(method)
+    own: Dict[str, str] = {}
+    for name, value in given.items():
+        flag = text_of(name, "the name of a method's option").replace("_", "-")
+        if flag not in kinds:
+            nearest = suggestion(_core.nearest_names(flag, list(kinds)))
+            raise TypeError(f"the method '{method}' has no option '{name}'{nearest}; it has "
+                            f"{', '.join(kinds)}")
+        if flag in own:
+            raise TypeError(f"method_options have '{flag}' twice, with a dash and with an "
+                            "underscore: give it once")
+        kind, may_be_open = kinds[flag]
+        own[flag] = _text_of(value, name, kind, may_be_open)
+    return own
+
+
+def _text_of(value: object, name: str, kind: str, may_be_open: bool) -> str:
     """Return the value of a method's option as the command line takes it."""
-    if isinstance(value, bool):
-        return "on" if value else "off"
-    return str(value)
+    if may_be_open and isinstance(value, str) and value == "auto":
+        return value
+    what = f"the option {name}"
+    if kind == "a whole number":
+        return str(whole_number_of(value, what))
+    if kind == "a number":
+        return repr(number_of(value, what))
+    if kind == "a text":
+        return text_of(value, what)
+    if isinstance(value, str) and value in ("on", "off"):
+        return value
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{what} is {kind}, not {value!r}")
+    return "on" if value else "off"
 
 
 def _run(choices: _core.Choices, core: _core.TiltSeries, progress: Watch) -> Reconstruction:
@@ -180,7 +214,7 @@ def _run(choices: _core.Choices, core: _core.TiltSeries, progress: Watch) -> Rec
                           record_of(made["metrics"]), (made["choices"], core))
 
 
-def _inputs(source: Any, tilt_deg: Optional[Sequence[float]], series: str,
+def _inputs(source: Any, tilt_deg: Optional[npt.ArrayLike], series: str,
             given: Mapping[str, object]) -> Tuple[_core.Choices, _core.TiltSeries]:
     if source is None or isinstance(source, (bool, int, float, complex, Mapping)):
         raise TypeError("a series is the path of a stack or of a project, a tomofield.Project, or an "

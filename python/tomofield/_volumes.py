@@ -28,6 +28,8 @@ class Tomogram:
     voxel_size_A: float
 
     def __post_init__(self) -> None:
+        if np.any(getattr(self.values, "mask", False)):
+            raise Error("a tomogram has no masked voxels: fill them (numpy.ma.filled)")
         if np.ndim(self.values) != 3:
             raise Error(f"a tomogram has values [z, y, x], and these have {np.ndim(self.values)} "
                         "dimensions")
@@ -39,6 +41,9 @@ class Tomogram:
 
     def __getitem__(self, key: Any) -> Any:
         return self.values[key]
+
+    def __len__(self) -> int:
+        return len(self.values)
 
     def __repr__(self) -> str:
         return f"<Tomogram of {self._size()}>"
@@ -230,8 +235,10 @@ def _angles(model: Model, level: Optional[Level]) -> Optional[Tuple[float, float
     if isinstance(level, str) and level == "found":
         return _core.found_levelling(model._core)
     try:
-        pitch, x_tilt = level
-        return float(pitch), float(x_tilt)
+        if not isinstance(level, (tuple, list, np.ndarray)):
+            raise TypeError
+        pitch, x_tilt = (number_of(angle, "an angle") for angle in level)
+        return pitch, x_tilt
     except (TypeError, ValueError):
         raise TypeError(f"level is 'found' or two angles in degrees, (pitch, x_tilt), not {level!r}"
                         ) from None

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <memory>
 #include <utility>
@@ -95,6 +97,12 @@ void set_message_handler(MessageHandler handler) {
   });
 }
 
-void set_thread_count(int count) { base::set_thread_count(count); }
+void set_thread_count(int count) {
+  if (count < 0 || count > base::kMostThreads)
+    throw Error(
+        fmt::format("the number of threads must be from 1 to {}, or 0 for the default, not {}",
+                    base::kMostThreads, count));
+  base::set_thread_count(count);
+}
 
 }  // namespace tomofield

@@ -9,6 +9,7 @@
 
 #include "base/enum_names.h"
 #include "base/nearest_names.h"
+#include "baseline/tune.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
@@ -180,10 +181,12 @@ std::vector<MethodOption> rows_of(const FourierNetOptions&) {
 template <typename T>
 struct Value {
   using type = T;
+  static constexpr bool kMayBeOpen = false;
 };
 template <typename T>
 struct Value<std::optional<T>> {
   using type = T;
+  static constexpr bool kMayBeOpen = true;
 };
 
 template <typename Enum>
@@ -219,6 +222,22 @@ std::string set_number(std::string_view text, const Range& range, Target& target
   return fmt::format("{} {}", kind, range.text());
 }
 
+// Sets `target` to what a text says. Returns what the text must be otherwise.
+template <typename V, typename Target>
+std::string set_value(std::string_view text, const Range& range, Target& target) {
+  if constexpr (std::is_same_v<V, bool>) {
+    if (text != "on" && text != "off") return "on or off";
+    target = text == "on";
+  } else if constexpr (std::is_enum_v<V>) {
+    const auto found = base::enum_named<V>(text);
+    if (!found) return names_of<V>(" or ");
+    target = *found;
+  } else {
+    return set_number<V>(text, range, target);
+  }
+  return {};
+}
+
 [[noreturn]] void refuse_name(const std::string& name, const char* method,
                               const std::vector<MethodOption>& known) {
   std::vector<std::string> names;
@@ -252,23 +271,51 @@ std::vector<MethodOption> options_of(const Method& method) {
       method);
 }
 
+bool takes_option(const Method& method, const option_table::Row& row) {
+  using option_table::Group;
+  const auto has = [&](const auto& list, const auto& wanted) {
+    return std::ranges::find(list, wanted) != list.end();
+  };
+  constexpr std::array kGroups{Group::kSeries,   Group::kAlignment, Group::kImages, Group::kMasks,
+                               Group::kTransfer, Group::kSpecimen,  Group::kVolume};
+  return has(kGroups, row.group) || has(kSharedFitKeys, row.key) || has(kRunKeys, row.key) ||
+         (row.key == "tune" && is_tunable(method));
+}
+
+ValueKind kind_of(const MethodOption& option) {
+  return std::visit(
+      []<typename T>(MethodOption::Reference<T>) {
+        using V = typename Value<T>::type;
+        if constexpr (std::is_same_v<V, bool>)
+          return ValueKind::kSwitch;
+        else if constexpr (std::is_enum_v<V>)
+          return ValueKind::kWord;
+        else
+          return std::is_integral_v<V> ? ValueKind::kWholeNumber : ValueKind::kNumber;
+      },
+      option.member);
+}
+
+bool may_be_open(const MethodOption& option) {
+  return std::visit([]<typename T>(MethodOption::Reference<T>) { return Value<T>::kMayBeOpen; },
+                    option.member);
+}
+
 std::string set_from_text(const MethodOption& option, std::string_view text,
                           BaselineOptions& options) {
   return std::visit(
       [&]<typename T>(MethodOption::Reference<T> member) -> std::string {
         using V = typename Value<T>::type;
-        if constexpr (std::is_same_v<V, bool>) {
-          if (text != "auto" && text != "on" && text != "off") return "auto, on or off";
-          member(options) = text == "auto" ? std::nullopt : std::optional(text == "on");
-          return {};
-        } else if constexpr (std::is_enum_v<V>) {
-          const auto found = base::enum_named<V>(text);
-          if (!found) return names_of<V>(" or ");
-          member(options) = *found;
-          return {};
-        } else {
-          return set_number<V>(text, option.range, member(options));
+        if constexpr (Value<T>::kMayBeOpen) {
+          if (text == "auto") {
+            member(options) = std::nullopt;
+            return {};
+          }
         }
+        std::string wanted = set_value<V>(text, option.range, member(options));
+        if (Value<T>::kMayBeOpen && !wanted.empty())
+          wanted.insert(0, std::is_same_v<V, bool> ? "auto, " : "auto or ");
+        return wanted;
       },
       option.member);
 }

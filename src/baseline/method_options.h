@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -30,6 +31,14 @@ struct MethodOption {
   std::string_view group = "Method";  ///< title in the help
 };
 
+/// The options of the table, by their keys, that every method has beside those of whole groups.
+inline constexpr std::array<std::string_view, 3> kSharedFitKeys{
+    "fit.fit_view_scale", "field.margin_spacing", "fit.hold_out"};
+inline constexpr std::array<std::string_view, 2> kRunKeys{"running.output", "running.overwrite"};
+
+/// Says whether a method takes an option of the table.
+bool takes_option(const Method& method, const option_table::Row& row);
+
 /// The words of the help for --non-negative, which `tensorf` has as well.
 inline constexpr std::string_view kNonNegativeHelp =
     "Keep densities at or above zero: with dark contrast nothing is brighter than the empty beam";
@@ -43,7 +52,13 @@ std::optional<Method> method_named(std::string_view name);
 /// Returns the options of a method, in the order of the help.
 std::vector<MethodOption> options_of(const Method& method);
 
-/// Sets an option to what a text says: "80", "concave"; "auto", "on" and "off" for one that may be
+/// The kind of value that an option takes.
+enum class ValueKind { kSwitch, kWholeNumber, kNumber, kWord };
+ValueKind kind_of(const MethodOption& option);
+/// Says whether an option may be left open, which is the word "auto".
+bool may_be_open(const MethodOption& option);
+
+/// Sets an option to what a text says: "80", "concave", "on" or "off"; "auto" for one that may be
 /// left open. Returns what the text must be if it is none of these, else an empty text.
 std::string set_from_text(const MethodOption& option, std::string_view text,
                           BaselineOptions& options);

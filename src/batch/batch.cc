@@ -37,19 +37,19 @@ void require_own_relion_table(const std::vector<Series>& all, const fs::path& fo
 
 }  // namespace
 
-void settle_outputs(std::vector<Series>& all, const PlanOptions& options) {
+void settle_outputs(std::vector<Series>& all, const PlanOptions& options, Faults& faults) {
   std::vector<fs::path> inputs, outputs;
   for (Series& series : all) {
-    series.output = output_of(series, options.folder);
+    faults.collect([&] { series.output = output_of(series, options.folder); });
     outputs.push_back(series.output);
     if (io::is_file(series.input)) inputs.push_back(series.input);
   }
-  require_own_names(all);
+  check_names(all, faults);
+  check_placeholders(all, options.common, faults);
   if (std::ranges::any_of(all, is_star_file)) outputs.push_back(relion_table(options.folder));
-  io::require_no_input_is_replaced(outputs, inputs);
-  require_own_relion_table(all, options.folder);
+  faults.collect([&] { io::require_no_input_is_replaced(outputs, inputs); });
+  faults.collect([&] { require_own_relion_table(all, options.folder); });
   if (options.skips_existing || options.overwrites) return;
-  Faults faults;
   for (const Series& series : all) {
     if (fs::exists(series.output))
       faults.add(
@@ -57,7 +57,6 @@ void settle_outputs(std::vector<Series>& all, const PlanOptions& options) {
                       "replaces it",
                       series.source, series.output.string()));
   }
-  faults.require_none();
 }
 
 void require_room(const std::vector<Job>& jobs, const Room& room) {

@@ -12,9 +12,10 @@
 namespace tomofield::batch {
 
 /// Gives the outputs of all series their names, and checks all that can be checked without running
-/// anything: that no two series share a name or an output, that no output is an input, and, unless
-/// existing results are skipped or replaced, that there are none. Throws Error with all mistakes.
-void settle_outputs(std::vector<Series>& all, const PlanOptions& options);
+/// anything: that no two series share a name or an output, that no output is an input, that
+/// placeholders stand for something, and, unless existing results are skipped or replaced, that
+/// there are none. Adds all mistakes to `faults`.
+void settle_outputs(std::vector<Series>& all, const PlanOptions& options, Faults& faults);
 
 /// Throws Error with every job that needs more memory than there is, also on one thread.
 void require_room(const std::vector<Job>& jobs, const Room& room);

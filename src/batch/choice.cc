@@ -138,8 +138,12 @@ ChoicePlan plan_choice(const fs::path& folder, bool continues, std::vector<Job>&
   std::vector<std::size_t> able;
   for (std::size_t i = 0; i < jobs.size(); ++i)
     if (takes_choice(jobs[i]) && jobs[i].needs.num_trials > 0) able.push_back(i);
-  if (able.empty() || std::ranges::count_if(jobs, takes_choice) < 2) return {};
+  if (able.empty()) return {};
   ChoicePlan plan;
+  if (std::ranges::count_if(jobs, takes_choice) < 2) {
+    if (jobs.size() > 1) plan.alone = able.front();
+    return plan;
+  }
   for (const std::size_t at : {std::size_t{0}, able.size() / 2, able.size() - 1})
     if (!std::ranges::count(plan.choosing, able[at])) plan.choosing.push_back(able[at]);
   return plan;

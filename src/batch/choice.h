@@ -54,6 +54,8 @@ struct ChoicePlan {
   std::optional<Choice> stored;        ///< of the batch that this one continues
   std::vector<std::size_t> choosing;   ///< jobs that are to make trials
   std::vector<std::size_t> differing;  ///< jobs that go on with other settings than the stored ones
+  /// The one job of several that is left to choose. It chooses for itself.
+  std::optional<std::size_t> alone = {};
 };
 /// Plans the choice of a batch. If it `continues` another one, series that have begun go on as they
 /// were: their commands get the settings that the list of that batch (slurm.h) has for

@@ -77,7 +77,8 @@ std::optional<Choice> read_choice(const fs::path& folder) {
   if (!fs::exists(file)) return std::nullopt;
   return io::read_record(file, choice_from, [&](const std::string& why) {
     return fmt::format(
-        "'{}' is not the choice of a batch ({}): remove it, and the batch chooses again",
+        "'{}' is not the choice of a batch ({}): remove it, and the series that are left choose "
+        "again",
         file.string(), why);
   });
 }

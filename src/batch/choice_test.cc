@@ -102,6 +102,20 @@ TEST(PlanChoice, LetsTheFirstTheMiddleAndTheLastOfTheListChoose) {
   EXPECT_EQ(choosing(jobs), (Numbers{1, 3}));
 }
 
+TEST(PlanChoice, NamesTheOneSeriesOfSeveralThatIsLeftToChoose) {
+  const ScratchDirectory directory;
+  std::vector<Job> jobs = open_jobs(3, directory.path());
+  jobs[0].is_skipped = jobs[2].is_skipped = true;
+  ChoicePlan plan = plan_choice(directory.path(), true, jobs);
+  EXPECT_TRUE(plan.choosing.empty());
+  EXPECT_EQ(plan.alone, 1u);
+  jobs[2].is_skipped = false;
+  EXPECT_FALSE(plan_choice(directory.path(), true, jobs).alone.has_value());
+  jobs.resize(1);
+  jobs[0].is_skipped = false;  // a batch of one shares nothing
+  EXPECT_FALSE(plan_choice(directory.path(), true, jobs).alone.has_value());
+}
+
 TEST(PlanChoice, TakesTheStoredOneIfTheBatchGoesOn) {
   const ScratchDirectory directory;
   std::vector<Job> jobs = open_jobs(3, directory.path());

@@ -7,7 +7,6 @@
 
 #include "batch/choice.h"
 #include "batch/relion_table.h"
-#include "batch/series_list.h"
 #include "batch/slurm.h"
 #include "batch/state_record.h"
 #include "batch/summary.h"
@@ -83,15 +82,14 @@ class Writers {
 
 }  // namespace
 
-void require_own_files(const fs::path& folder, const fs::path& list, const std::vector<Job>& jobs) {
-  Faults faults;
+void check_files(const fs::path& folder, const fs::path& list, const std::vector<Job>& jobs,
+                 Faults& faults) {
   Writers writers(faults);
   const auto name_of = [](const Job& job) { return fmt::format("the series '{}'", job.name); };
   writers.add("the batch itself", files_of_batch(folder, jobs));
   for (const Job& job : jobs) writers.add(name_of(job), results_of(job));
   writers.require_none_reads("the list of the series", {list});
   for (const Job& job : jobs) writers.require_none_reads(name_of(job), job.files.inputs);
-  faults.require_none();
 }
 
 }  // namespace tomofield::batch

@@ -1,14 +1,35 @@
 #include "batch/job.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
+#include "io/images/mrc.h"
 #include "output/output_paths.h"
+#include "record/run_summary_record.h"
+#include "tomofield/error.h"
 
 namespace tomofield::batch {
+namespace {
 
 namespace fs = std::filesystem;
+
+// Returns the usual files of a job that are there.
+std::vector<fs::path> files_of(const fs::path& output) {
+  const output::OutputPaths paths = output::output_paths(output);
+  std::vector<fs::path> files{paths.volume,         paths.model,
+                              paths.json,           paths.report,
+                              paths.choice_picture, paths.dial_picture,
+                              paths.prior_picture,  paths.trials,
+                              paths.alignment,      paths.alignment_picture,
+                              paths.tiles};
+  for (const fs::path& picture : paths.pictures()) files.push_back(picture);
+  std::erase_if(files, [](const fs::path& file) { return !fs::exists(file); });
+  return files;
+}
+
+}  // namespace
 
 Needs needs_of(const record::PlanRecord& plan) {
   const std::int64_t more_threads = plan.num_threads - 1;
@@ -29,6 +50,39 @@ Needs needs_of(const record::PlanRecord& plan) {
 bool has_results(const fs::path& output) {
   const output::OutputPaths paths = output::output_paths(output);
   return fs::exists(paths.volume) && fs::exists(paths.json);
+}
+
+std::string fault_of_results(const fs::path& output) {
+  const output::OutputPaths paths = output::output_paths(output);
+  try {
+    const io::MrcReader tomogram(paths.volume);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  try {
+    record::read_summary(paths.json);
+  } catch (const Error& error) {
+    return fmt::format("'{}' is not what a run writes of itself ({})", paths.json.string(),
+                       error.what());
+  }
+  return {};
+}
+
+std::string advice_on_files(const fs::path& output) {
+  std::vector<std::string> names;
+  for (const fs::path& file : files_of(output))
+    names.push_back(fmt::format("'{}'", file.filename().string()));
+  if (names.empty()) names.emplace_back("its files");
+  return fmt::format("remove {} from '{}', and the batch runs this series again, or leave it out",
+                     fmt::join(names, ", "), fs::absolute(output).parent_path().string());
+}
+
+std::string reason_in_batch(const std::string& said, const fs::path& output) {
+  const std::size_t advice = said.find("--overwrite");
+  if (advice == said.npos) return said;
+  // Adding 1 makes the end of a clause that is not there the smallest.
+  const std::size_t end = std::max(said.rfind(": ", advice) + 1, said.rfind("; ", advice) + 1) - 1;
+  return fmt::format("{}: {}", said.substr(0, end), advice_on_files(output));
 }
 
 bool has_checkpoint(const fs::path& output) {

@@ -63,6 +63,14 @@ std::map<std::string, std::vector<std::string>> read_commands(const std::filesys
 
 /// Returns whether the results of a job are there: the tomogram and its metrics.
 bool has_results(const std::filesystem::path& output);
+/// Returns what is wrong with these results, or an empty text if the tomogram has the size that its
+/// header states and the metrics are those of a run.
+std::string fault_of_results(const std::filesystem::path& output);
+/// Returns what a user can do if the files of a job are in its way: to remove those that there are.
+std::string advice_on_files(const std::filesystem::path& output);
+/// Returns why a run failed as a batch says it. A run that finds other files in its way advises to
+/// overwrite them or to take another name, which a batch would do for all series.
+std::string reason_in_batch(const std::string& said, const std::filesystem::path& output);
 /// Returns whether a fit has begun: there is a checkpoint, or trials of --tune.
 bool has_checkpoint(const std::filesystem::path& output);
 /// Returns whether a run can continue: there is a checkpoint, or an alignment.

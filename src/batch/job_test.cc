@@ -65,6 +65,27 @@ TEST(Jobs, OfADamagedListAreRefused) {
   }
 }
 
+TEST(Jobs, HaveTheirOwnFilesToRemoveInPlaceOfTheAdviceOfARun) {
+  const ScratchDirectory directory;
+  for (const char* name : {"a.h5", "a_xy.png", "b.json"}) directory.write(name, "");
+  const std::string advice = ": remove 'a.h5', 'a_xy.png' from '" + directory.path().string() +
+                             "', and the batch runs this series again, or leave it out";
+  const auto reason = [&](const std::string& said) {
+    return reason_in_batch(said, directory / "a.mrc");
+  };
+  EXPECT_EQ(reason("'a.h5' exists: give --overwrite to replace it, or another name with -o"),
+            "'a.h5' exists" + advice);
+  EXPECT_EQ(reason("cannot resume: 'a.h5' is odd; to start over, give --overwrite"),
+            "cannot resume: 'a.h5' is odd" + advice);
+  EXPECT_EQ(reason("section 3 is black"), "section 3 is black");
+}
+
+TEST(Jobs, AreNotFinishedByFilesThatCannotBeRead) {
+  const ScratchDirectory directory;
+  for (const char* name : {"a.mrc", "a.json"}) directory.write(name, "");
+  EXPECT_NE(fault_of_results(directory / "a.mrc").find("a.mrc"), std::string::npos);
+}
+
 TEST(Needs, ComeFromThePlanOfARun) {
   const auto needs = [](std::int64_t threads) {
     return needs_of({.num_trials = 6,

@@ -3,17 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <map>
 #include <string>
-#include <string_view>
 #include <utility>
 
 #include "base/system/child_process.h"
 #include "batch/file_conflicts.h"
+#include "batch/placeholders.h"
 #include "batch/series_list.h"
 #include "io/saving/output_folder.h"
-#include "tomofield/error.h"
 
 namespace tomofield::batch {
 namespace {
@@ -21,56 +19,13 @@ namespace {
 namespace fs = std::filesystem;
 using option_table::GivenOption;
 
-// Says whether a text in braces is written like the name of a placeholder.
-bool is_word(std::string_view text) {
-  return !text.empty() && std::ranges::all_of(text, [](unsigned char c) {
-    return std::isalpha(c) != 0 || c == '_';
-  });
-}
-
-// Returns a text with the names of a series in place of {name} and {folder}. Throws Error, with
-// what `where` says of the text, for another word in braces.
-std::string filled(const Series& series, const std::string& text, const std::string& where) {
-  const fs::path folder = series.input.parent_path();
-  std::string result;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = text[at] == '{' ? text.find('}', at) : std::string::npos;
-    const std::string word = end == std::string::npos ? "" : text.substr(at + 1, end - at - 1);
-    if (word == "name") {
-      result += series_name(series.input);
-    } else if (word == "folder") {
-      result += folder.empty() ? "." : folder.string();
-    } else if (is_word(word)) {
-      throw Error(
-          fmt::format("{}: '{{{}}}' stands for nothing: {{name}} stands for the name of a "
-                      "series' file without its ending, {{folder}} for its folder",
-                      where, word));
-    } else {
-      result += text[at++];
-      continue;
-    }
-    at = end + 1;
-  }
-  return result;
-}
-
 GivenOption option_for(const Series& series, GivenOption option, const std::string& where) {
-  if (option.value) option.value = filled(series, *option.value, where);
+  if (option.value) option.value = fill_placeholders(series.input, *option.value, where);
   return option;
 }
 
-// Throws Error with every word in braces that stands for nothing in an option.
-void require_placeholders(const std::vector<Series>& all, const std::vector<GivenOption>& common) {
-  for (const GivenOption& option : common) option_for({}, option, option.flag);
-  Faults faults;
-  for (const Series& series : all) {
-    try {
-      command_of(series, {});
-    } catch (const Error& error) {
-      faults.add(error.what());
-    }
-  }
-  faults.require_none();
+std::string place_of(const Series& series, const GivenOption& option) {
+  return series.source + ", " + option.flag;
 }
 
 // Returns the words that check a job and write what it needs to `plan`.
@@ -108,7 +63,7 @@ class Stacks {
 
 fs::path output_of(const Series& series, const fs::path& folder) {
   if (series.output.empty()) return folder / (series.name + ".mrc");
-  return filled(series, series.output.string(), series.source + ", output");
+  return fill_placeholders(series.input, series.output.string(), series.source + ", output");
 }
 
 std::vector<std::string> command_of(const Series& series, const std::vector<GivenOption>& common) {
@@ -121,13 +76,21 @@ std::vector<std::string> command_of(const Series& series, const std::vector<Give
       words.push_back(option_for(series, option, option.flag).word());
   }
   for (const GivenOption& option : series.options)
-    words.push_back(option_for(series, option, series.source + ", " + option.flag).word());
+    words.push_back(option_for(series, option, place_of(series, option)).word());
   words.push_back("--output=" + series.output.string());
   return words;
 }
 
+void check_placeholders(const std::vector<Series>& all, const std::vector<GivenOption>& common,
+                        Faults& faults) {
+  for (const GivenOption& option : common)
+    faults.collect([&] { option_for({}, option, option.flag); });
+  for (const Series& series : all)
+    for (const GivenOption& option : series.options)
+      faults.collect([&] { option_for(series, option, place_of(series, option)); });
+}
+
 JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
-  require_placeholders(all, options.common);
   const io::ScratchFolder scratch(options.folder, ".tomofield-plan");
   const fs::path plan = scratch.path() / "plan.json", log = scratch.path() / "log";
   Faults faults;
@@ -140,15 +103,19 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
             .needs = {},
             .is_skipped = options.skips_existing && has_results(series.output),
             .files = {.inputs = {series.input}, .results = {}}};
-    if (!job.is_skipped) {
+    if (job.is_skipped) {
+      if (const std::string fault = fault_of_results(series.output); !fault.empty())
+        faults.add(fmt::format("{}: {}: {}", series.source, fault, advice_on_files(series.output)));
+    } else {
       fs::remove(plan);
       const base::ChildResult result =
           base::run_child(plan_command(options, job, plan), log, options.stop_requested);
       if (options.stop_requested && options.stop_requested()) return list;
-      if (result.exit_status != 0)
-        faults.add(
-            fmt::format("{}: {}", series.source, base::reason_of_failure(result.exit_status, log)));
-      else {
+      if (result.exit_status != 0) {
+        const std::string said = base::reason_of_failure(result.exit_status, log);
+        faults.add(fmt::format("{}: {}", series.source,
+                               options.overwrites ? said : reason_in_batch(said, series.output)));
+      } else {
         const record::PlanRecord planned = record::read_plan(plan);
         add_plan(planned, job);
         stacks.require_new(planned.stack, series, faults);
@@ -156,8 +123,8 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
     }
     list.jobs.push_back(std::move(job));
   }
+  check_files(options.folder, options.list, list.jobs, faults);
   faults.require_none();
-  require_own_files(options.folder, options.list, list.jobs);
   return list;
 }
 

@@ -23,8 +23,8 @@ struct PlanOptions {
   std::function<bool()> stop_requested;
 };
 
-// In the values of options and in outputs, {name} stands for the name of a series' file without its
-// ending and {folder} for its folder. All functions throw Error for another word in braces.
+// The values of options and outputs have placeholders (placeholders.h). All functions throw Error
+// for one that stands for nothing.
 
 /// Returns where the tomogram of a series goes.
 std::filesystem::path output_of(const Series& series, const std::filesystem::path& folder);
@@ -33,10 +33,14 @@ std::filesystem::path output_of(const Series& series, const std::filesystem::pat
 std::vector<std::string> command_of(const Series& series,
                                     const std::vector<option_table::GivenOption>& common);
 
+/// Adds every placeholder that stands for nothing in the options of all series and of each.
+void check_placeholders(const std::vector<Series>& all,
+                        const std::vector<option_table::GivenOption>& common, Faults& faults);
+
 /// Makes a job of every series, and runs each with --plan to check it and to find what it needs.
-/// Does not check series that are skipped. The outputs of the series are there. Throws Error with
-/// the mistakes of all series, also if a file would be written twice or is an input
-/// (file_conflicts.h). Returns fewer jobs if it was asked to stop.
+/// Series that are skipped must have readable results, and are not checked otherwise. The outputs
+/// of the series are there. Throws Error with the mistakes of all series, also if a file would be
+/// written twice or is an input (file_conflicts.h). Returns fewer jobs if it was asked to stop.
 JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options);
 
 }  // namespace tomofield::batch

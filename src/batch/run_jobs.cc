@@ -59,6 +59,7 @@ bool RunningJob::has_ended() {
   } else {
     state.progress = Progress::kFailed;
     state.reason = base::reason_of_failure(result->exit_status, log_of(options_->folder, *job_));
+    if (!options_->overwrites) state.reason = reason_in_batch(state.reason, job_->output);
   }
   write_state(options_->folder, *job_, state);
   return true;

@@ -5,12 +5,15 @@
 #include <glob.h>
 
 #include <algorithm>
+#include <cctype>
 #include <map>
 #include <optional>
 
 #include "base/log.h"
+#include "base/nearest_names.h"
 #include "base/utf8.h"
 #include "batch/csv.h"
+#include "batch/placeholders.h"
 #include "io/tables/relion_star.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -32,11 +35,33 @@ std::string place(const fs::path& path, int line) {
   return fmt::format("line {} of '{}'", line, path.string());
 }
 
-std::string fault_of(const Column& column) {
+// Returns a column's name as it must be spelled: "tilt-axis" for "--Tilt_Axis".
+std::string usual_spelling(std::string_view name) {
+  name.remove_prefix(std::min(name.find_first_not_of('-'), name.size()));
+  std::string usual;
+  for (const unsigned char c : name) usual += c == '_' ? '-' : static_cast<char>(std::tolower(c));
+  return usual;
+}
+
+// Returns a sentence on a name that is neither a column nor an option.
+std::string fault_of_unknown(const std::string& name, const KnownColumns& known) {
+  const std::string usual = usual_spelling(name);
+  if (!Column{.name = usual}.is_option() || known.kind_of("--" + usual) != ColumnKind::kUnknown)
+    return fmt::format(
+        "'{}' must be written '{}': columns have small letters, and options no dashes before them",
+        name, usual);
+  std::vector<std::string> names{"stack", "path", "name", "output"};
+  names.insert(names.end(), known.names.begin(), known.names.end());
+  const std::vector<std::string> nearest = base::nearest_names(usual, names);
+  return fmt::format(
+      "'{}' is no option of `tomofield reconstruct`{}, which --help-all lists", name,
+      nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", fmt::join(nearest, "' or '")));
+}
+
+std::string fault_of(const Column& column, const KnownColumns& known) {
   switch (column.kind) {
     case ColumnKind::kUnknown:
-      return fmt::format("'{}' is no option of `tomofield reconstruct`, which --help-all lists",
-                         column.name);
+      return fault_of_unknown(column.name, known);
     case ColumnKind::kNotHere:
       return fmt::format("'{}' is set by the batch and cannot be a column", column.name);
     case ColumnKind::kFlag:
@@ -46,10 +71,37 @@ std::string fault_of(const Column& column) {
   return {};
 }
 
+// Throws Error if the head is one column because the table has another separator.
+void require_separator(const fs::path& path, const CsvRecord& head) {
+  if (head.fields.size() > 1) return;
+  const std::string& name = head.fields.front();
+  const bool has_tabs = name.find('\t') != std::string::npos;
+  if (!has_tabs && name.find(';') == std::string::npos) return;
+  throw Error(fmt::format("{}: its columns are separated by {}", place(path, head.line),
+                          has_tabs
+                              ? "tabs: give the table a name that ends with .tsv"
+                              : "semicolons: save it with commas, or with tabs as a .tsv file"));
+}
+
+// Throws Error, also with what is wrong beside it, unless one column has the series.
+void require_input(const fs::path& path, const CsvRecord& head, const std::vector<Column>& columns,
+                   Faults& faults) {
+  if (std::ranges::count_if(columns, &Column::is_input) == 1) return;
+  const bool is_misspelt = std::ranges::any_of(columns, [](const Column& column) {
+    return column.kind == ColumnKind::kUnknown &&
+           Column{.name = usual_spelling(column.name)}.is_input();
+  });
+  if (!is_misspelt)
+    faults.add(
+        fmt::format("{}: one column must be named 'stack' (or 'path'), for the files of the series",
+                    place(path, head.line)));
+  faults.require_none();
+}
+
 // Returns the columns that the first record names.
 std::vector<Column> read_head(const fs::path& path, const CsvRecord& head,
-                              const KindOfColumn& kind_of) {
-  Faults faults;
+                              const KnownColumns& known, Faults& faults) {
+  require_separator(path, head);
   std::vector<Column> columns;
   const auto fail = [&](const std::string& what) {
     faults.add(fmt::format("{}: {}", place(path, head.line), what));
@@ -58,18 +110,17 @@ std::vector<Column> read_head(const fs::path& path, const CsvRecord& head,
     Column column{.name = name};
     if (name.empty()) {
       fail("a column has no name");
+      column.kind = ColumnKind::kUnknown;
     } else if (std::ranges::count(head.fields, name) > 1 &&
                std::ranges::find(columns, name, &Column::name) == columns.end()) {
       fail(fmt::format("there are two columns '{}'", name));
     } else if (column.is_option()) {
-      column.kind = kind_of("--" + name);
-      if (const std::string fault = fault_of(column); !fault.empty()) fail(fault);
+      column.kind = known.kind_of("--" + name);
+      if (const std::string fault = fault_of(column, known); !fault.empty()) fail(fault);
     }
     columns.push_back(column);
   }
-  if (std::ranges::count_if(columns, &Column::is_input) != 1)
-    fail("one column must be named 'stack' (or 'path'), for the files of the series");
-  faults.require_none();
+  require_input(path, head, columns, faults);
   return columns;
 }
 
@@ -80,9 +131,11 @@ std::optional<bool> read_flag(const std::string& cell) {
   return std::nullopt;
 }
 
-// Adds the option of a cell that is not empty. Returns what is wrong, or an empty text.
+// Adds the option of a cell that is not empty. Returns what is wrong, or an empty text. The head
+// says what is wrong with a column.
 std::string add_option(const Column& column, const std::string& cell, Series& series) {
   const std::string flag = "--" + column.name;
+  if (column.kind == ColumnKind::kUnknown || column.kind == ColumnKind::kNotHere) return {};
   if (column.kind == ColumnKind::kWithValue) {
     series.options.push_back({flag, cell});
     return {};
@@ -123,7 +176,12 @@ Series read_row(const fs::path& path, const CsvRecord& record, const std::vector
     fail("the series has no stack");
   else if (std::error_code absent; !fs::exists(series.input, absent))
     fail(fmt::format("'{}' does not exist", series.input.string()));
-  if (series.name.empty()) series.name = series_name(series.input);
+  if (series.name.empty())
+    series.name = series_name(series.input);
+  else
+    faults.collect([&] {
+      series.name = fill_placeholders(series.input, series.name, series.source + ", name");
+    });
   return series;
 }
 
@@ -145,7 +203,7 @@ std::string series_name(const fs::path& input) {
   return fs::is_directory(path, absent) ? path.filename().string() : path.stem().string();
 }
 
-std::vector<Series> read_table(const fs::path& path, const KindOfColumn& kind_of) {
+std::vector<Series> read_table(const fs::path& path, const KnownColumns& known, Faults& faults) {
   std::vector<CsvRecord> records;
   try {
     records = parse_csv(io::read_text_file(path), path.extension() == ".tsv" ? '\t' : ',');
@@ -157,12 +215,11 @@ std::vector<Series> read_table(const fs::path& path, const KindOfColumn& kind_of
         fmt::format("the table '{}' has no series: it needs a line that names its columns, "
                     "and a line for every series",
                     path.string()));
-  const std::vector<Column> columns = read_head(path, records.front(), kind_of);
+  const std::vector<Column> columns = read_head(path, records.front(), known, faults);
   std::vector<Series> all;
-  Faults faults;
   for (auto record = records.begin() + 1; record != records.end(); ++record)
     all.push_back(read_row(path, *record, columns, faults));
-  faults.require_none();
+  std::erase_if(all, [](const Series& series) { return series.input.empty(); });
   return all;
 }
 
@@ -200,8 +257,7 @@ std::vector<Series> read_star(const fs::path& path) {
   return all;
 }
 
-void require_own_names(const std::vector<Series>& all) {
-  Faults faults;
+void check_names(const std::vector<Series>& all, Faults& faults) {
   std::map<std::string, const Series*> names;
   std::map<fs::path, const Series*> outputs;
   for (const Series& series : all) {
@@ -223,7 +279,6 @@ void require_own_names(const std::vector<Series>& all) {
       faults.add(fmt::format("{} and {} have the same output '{}'", same->second->source,
                              series.source, series.output.string()));
   }
-  faults.require_none();
 }
 
 void Faults::require_none() const {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "option_table/setting.h"
+#include "tomofield/error.h"
 
 namespace tomofield::batch {
 
@@ -13,6 +14,15 @@ namespace tomofield::batch {
 class Faults {
  public:
   void add(std::string sentence) { sentences_.push_back(std::move(sentence)); }
+  /// Adds the mistake that `check` throws as Error, if it throws one.
+  template <typename Check>
+  void collect(const Check& check) {
+    try {
+      check();
+    } catch (const Error& error) {
+      add(error.what());
+    }
+  }
   /// Throws Error if there is a mistake. Of several, logs each on a line of its own before.
   void require_none() const;
 
@@ -38,13 +48,20 @@ enum class ColumnKind {
 };
 /// Returns the kind of an option, which is given by its flag, as in "--thickness".
 using KindOfColumn = std::function<ColumnKind(const std::string& flag)>;
+/// The options of `reconstruct` that a table may set.
+struct KnownColumns {
+  KindOfColumn kind_of;
+  std::vector<std::string> names;  ///< without dashes, for suggestions
+};
 
 /// Reads a table: comma-separated values, or values separated by tabs if its name ends with .tsv.
 /// Its first line names the columns. `stack` (or `path`) is the series, `name` and `output` may be
 /// there, and any other column is an option of `reconstruct` without its dashes. An empty cell
-/// means the default. Cells of flags are true, false or empty. Throws Error with every mistake,
-/// each with its line.
-std::vector<Series> read_table(const std::filesystem::path& path, const KindOfColumn& kind_of);
+/// means the default. Cells of flags are true, false or empty. Names have {name} and {folder}
+/// filled in (placeholders.h). Adds every mistake with its line to `faults`, and leaves out the
+/// series that have no stack. Throws Error if it cannot tell which columns there are.
+std::vector<Series> read_table(const std::filesystem::path& path, const KnownColumns& known,
+                               Faults& faults);
 
 /// Returns the files and folders that a pattern of the shell names, in their order. A file gives
 /// its series the name of the file without its ending. Those with the same name get that of their
@@ -60,8 +77,8 @@ std::vector<Series> read_star(const std::filesystem::path& path);
 /// its folder.
 std::string series_name(const std::filesystem::path& input);
 
-/// Throws Error with every series whose name cannot be that of a file, and with every name and
-/// output that two series share. The outputs are there.
-void require_own_names(const std::vector<Series>& all);
+/// Adds every series whose name cannot be that of a file, and every name and output that two series
+/// share. The outputs are there.
+void check_names(const std::vector<Series>& all, Faults& faults);
 
 }  // namespace tomofield::batch

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <utility>
 
 #include "base/log.h"
+#include "batch/placeholders.h"
 #include "batch/planning.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -16,7 +18,7 @@ using option_table::GivenOption;
 using testing::message_of;
 
 ColumnKind kind_of(const std::string& flag) {
-  if (flag == "--thickness" || flag == "--center") return ColumnKind::kWithValue;
+  if (flag == "--thickness" || flag == "--center" || flag == "--tlt") return ColumnKind::kWithValue;
   if (flag == "--invert") return ColumnKind::kFlag;
   return flag == "--threads" ? ColumnKind::kNotHere : ColumnKind::kUnknown;
 }
@@ -31,8 +33,12 @@ class SeriesList : public ::testing::Test {
   ~SeriesList() override { base::set_log_sink({}); }
 
   std::string path(const std::string& name) const { return (directory_ / name).string(); }
-  std::vector<Series> read(const std::string& text) {
-    return read_table(directory_.write("list.csv", text), kind_of);
+  std::vector<Series> read(const std::string& text, const std::string& name = "list.csv") {
+    Faults faults;
+    auto all = read_table(directory_.write(name, text),
+                          {kind_of, {"thickness", "center", "invert", "tlt"}}, faults);
+    faults.require_none();
+    return all;
   }
   // Returns all that is said of a table that is refused.
   std::string refusal(const std::string& text) {
@@ -75,6 +81,52 @@ TEST_F(SeriesList, ColumnsMustBeKnown) {
   EXPECT_NE(refusal("stack\n").find("no series"), std::string::npos);
 }
 
+TEST_F(SeriesList, ColumnsThatAreAlmostRightAreNamed) {
+  const std::pair<std::string, std::string> heads[] = {
+      {"stack,thicknes", "(did you mean 'thickness'?)"},
+      {"stack,--tlt", "'--tlt' must be written 'tlt'"},
+      {"stack,Thickness", "'Thickness' must be written 'thickness'"},
+      {"Stack,tlt", "'Stack' must be written 'stack'"},
+      {"stack;tlt", "semicolons: save it with commas"},
+      {"stack\ttlt", "tabs: give the table a name that ends with .tsv"}};
+  for (const auto& [head, part] : heads) {
+    const std::string said = refusal(head + "\n" + path("a.mrc") + "\n");
+    EXPECT_NE(said.find(part), std::string::npos) << part << " in " << said;
+    EXPECT_EQ(said.find("one column must be"), std::string::npos) << said;
+  }
+}
+
+TEST_F(SeriesList, MistakesOfTheHeadDoNotHideThoseOfRows) {
+  const std::string said =
+      refusal("stack,thicknes,invert\n" + path("a.mrc") + ",12,maybe\nnowhere,1,\n");
+  for (const char* part : {"'thicknes'", "'maybe'", "'nowhere'", "3 mistakes"})
+    EXPECT_NE(said.find(part), std::string::npos) << part << " in " << said;
+}
+
+TEST_F(SeriesList, NamesHavePlaceholders) {
+  const auto all = read("stack,name\n" + path("a.mrc") + ",C_{name}\n" + path("b.mrc") + ",{x\n");
+  EXPECT_EQ(all[0].name, "C_a");
+  EXPECT_EQ(all[1].name, "{x");
+  EXPECT_NE(refusal("stack,name\n" + path("a.mrc") + ",C_{nam}\n").find("name: '{nam}' stands"),
+            std::string::npos);
+  EXPECT_NE(refusal("stack,name\n" + path("a.mrc") + ",{name\n").find("is not closed"),
+            std::string::npos);
+}
+
+TEST(FillPlaceholders, FillsWordsInBracesAndRefusesOthers) {
+  const auto filled = [](const std::string& text) {
+    return fill_placeholders("data/a.b.mrc", text, "here");
+  };
+  EXPECT_EQ(filled("{folder}/{name}.tlt"), "data/a.b.tlt");
+  EXPECT_EQ(fill_placeholders("a.mrc", "{folder}", "here"), ".");
+  for (const char* text : {"{", "{}", "{1}", "{a b}", "{na", "}{"}) EXPECT_EQ(filled(text), text);
+  EXPECT_THROW(filled("{names}"), Error);
+  for (const char* text : {"{name.tlt", "{folder/x", "x{name", "{name.tlt}"})
+    EXPECT_NE(message_of<Error>([&] { filled(text); }).find("here: the brace of '{"),
+              std::string::npos)
+        << text;
+}
+
 TEST_F(SeriesList, PatternsGiveNamesThatDiffer) {
   for (const char* folder : {"one", "two"}) {
     std::filesystem::create_directory(directory_ / folder);
@@ -94,11 +146,16 @@ TEST_F(SeriesList, NamesAndOutputsMustDiffer) {
   const auto series = [](const char* name, const char* output) {
     return Series{.name = name, .source = "x", .input = {}, .output = output, .options = {}};
   };
-  EXPECT_NO_THROW(require_own_names({series("a", "a.mrc"), series("b", "b.mrc")}));
-  EXPECT_THROW(require_own_names({series("a", "a.mrc"), series("a", "b.mrc")}), Error);
-  EXPECT_THROW(require_own_names({series("a", "a.mrc"), series("b", "x/../a.mrc")}), Error);
+  const auto check = [](const std::vector<Series>& all) {
+    Faults faults;
+    check_names(all, faults);
+    faults.require_none();
+  };
+  EXPECT_NO_THROW(check({series("a", "a.mrc"), series("b", "b.mrc")}));
+  EXPECT_THROW(check({series("a", "a.mrc"), series("a", "b.mrc")}), Error);
+  EXPECT_THROW(check({series("a", "a.mrc"), series("b", "x/../a.mrc")}), Error);
   for (const char* name : {"", "a/b", ".hidden", "a\nb"})
-    EXPECT_THROW(require_own_names({series(name, "a.mrc")}), Error) << name;
+    EXPECT_THROW(check({series(name, "a.mrc")}), Error) << name;
 }
 
 TEST_F(SeriesList, OptionsOfASeriesReplaceThoseOfAll) {

@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -76,6 +77,12 @@ std::string optional_number(const std::optional<double>& value, int digits) {
   return value ? number(*value, digits) : std::string();
 }
 
+// Returns the line of a verdict without the word that begins it.
+std::string verdict_text(const std::string& line) {
+  constexpr std::string_view kTitle = "verdict: ";
+  return line.starts_with(kTitle) ? line.substr(kTitle.size()) : line;
+}
+
 std::string csv_text(const std::vector<Line>& lines) {
   std::string text =
       "name,state,reason,output,wall_seconds,core_seconds,expected_core_seconds,peak_GiB,"
@@ -94,7 +101,7 @@ std::string csv_text(const std::vector<Line>& lines) {
         number(static_cast<double>(costs.peak_bytes) / kGibibyte, 3),
         number(static_cast<double>(needs.memory_bytes_of_one_thread) / kGibibyte, 3),
         optional_number(line.run.held_out_error, 5),
-        spreadsheet_text(line.run.verdict),
+        spreadsheet_text(verdict_text(line.run.verdict)),
         spreadsheet_text(fmt::format("{}", fmt::join(line.run.warnings, " "))),
     };
     std::vector<std::string> quoted;

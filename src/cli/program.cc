@@ -2,6 +2,7 @@
 #include "base/system/child_process.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -15,9 +16,11 @@
 #include <vector>
 
 #include "base/log.h"
+#include "base/nearest_names.h"
 #include "base/threads/parallel.h"
 #include "base/version.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/examples.h"
 #include "cli/options/config_file.h"
 #include "cli/options/help_formatter.h"
 #include "cli/options/parse_fault.h"
@@ -62,6 +65,15 @@ std::string command_name(const CLI::App& program) {
   return name;
 }
 
+// Returns the commands that are most like a misspelt one, in brackets, or an empty text.
+std::string suggestion(const CLI::App& program, const std::string& word) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : program.get_subcommands(nullptr))
+    names.push_back(command->get_name());
+  const std::vector<std::string> nearest = base::nearest_names(word, names);
+  return nearest.empty() ? "" : fmt::format(" (did you mean {}?)", fmt::join(nearest, " or "));
+}
+
 // Refuses a misspelt command. CLI11 would say that a command is missing.
 void require_known_command(const CLI::App& program, const std::vector<std::string>& arguments) {
   const CLI::App* app = &program;
@@ -71,8 +83,9 @@ void require_known_command(const CLI::App& program, const std::vector<std::strin
     const auto named =
         app->get_subcommands([&](const CLI::App* sub) { return sub->get_name() == word; });
     if (named.empty())
-      throw Error(fmt::format("there is no {} '{}': `{} --help` lists them",
-                              app == &program ? "command" : "method", word, command));
+      throw Error(fmt::format("there is no {} '{}'{}: `{} --help` lists them",
+                              app == &program ? "command" : "method", word, suggestion(*app, word),
+                              command));
     command += " " + word;
     app = named.front();
   }
@@ -204,6 +217,7 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
       "all.\n"
       "Example: tomofield reconstruct TS_01/ -o TS_01.mrc   (the folder of an eTomo project)");
   add_commands(program, processes);
+  add_examples(program);
   try {
     return run_command(program, {argv + 1, argv + argc}, processes);
   } catch (const distributed::SharedError& error) {

@@ -313,6 +313,12 @@ def test_existing_results_are_kept_unless_overwritten(plain, series):
         assert read_bytes(command[-1]) != before
 
 
+def test_what_is_automatic_can_be_given_as_such(baseline):
+    automatic, _ = baseline("tv", "auto", "--weight", "auto", "--penalty", "auto", "--iterations", 2)
+    method = automatic.record["options"]["method"]
+    assert method["penalty"] == "smooth" and method["weight"] == 3
+
+
 def test_bad_input_gets_a_sentence_and_nothing_is_written(baseline, series):
     short = series.with_views("short", series.views[:-1])
     xtilt = os.path.join(series.directory, "five.xtilt")

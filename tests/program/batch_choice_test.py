@@ -180,6 +180,18 @@ def test_a_batch_that_goes_on_takes_the_stored_choice(data):
         assert ("--tv=3.5" in commands(folder)[name]) == (name != begun), name
 
 
+def test_the_one_series_that_is_left_without_a_choice_is_named(data, each):
+    """Without choice.json there is nobody to share a new choice with."""
+    folder = harness.fresh_directory("choice_left")
+    for name in "ab":
+        for ending in (".mrc", ".json"):
+            with open(os.path.join(folder, name + ending), "wb") as file:
+                file.write(harness.read_bytes(os.path.join(each, name + ending)))
+    said = harness.succeed("batch", *pattern(data), *OPEN, "--skip-existing", "--dry-run", "-o",
+                           folder).stdout
+    assert "c alone is left to choose" in said and "trials of" not in said, said
+
+
 def test_a_damaged_choice_is_refused_with_what_to_do(data, once):
     folder = harness.fresh_directory("choice_damaged")
     stored = read(once, "choice.json")

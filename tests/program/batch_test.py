@@ -134,6 +134,8 @@ def test_names_are_filled_in_in_cells(data):
             ([["stack", "tlt"], [os.path.join(data, "a.mrc"), "{folder}/{nam}.tlt"],
               [os.path.join(data, "b.mrc"), "{place}/b.tlt"]], [],
              ["line 2 of", "--tlt: '{nam}'", "line 3 of", "'{place}'", "{folder} for its folder"]),
+            ([["stack", "tlt"], [os.path.join(data, "a.mrc"), "{folder}/{name.tlt"]], [],
+             ["line 2 of", "--tlt: the brace of '{name' is not closed"]),
             ([["stack", "output"], [os.path.join(data, "a.mrc"), "{nam}.mrc"]], [],
              ["line 2 of", "output: '{nam}'"]),
             ([["stack"], [os.path.join(data, "a.mrc")]], ["--tlt", "{nam}.tlt"],
@@ -143,6 +145,16 @@ def test_names_are_filled_in_in_cells(data):
         assert refused.returncode == 2, refused
         for part in parts:
             assert part in refused.stderr, (part, refused.stderr)
+
+
+def test_names_are_filled_in_in_the_names_of_series(data):
+    folder = harness.fresh_directory("filled_names")
+    table = write_table(os.path.join(folder, "list.csv"),
+                        [["stack", "tlt", "name"],
+                         *([os.path.join(data, f"{name}.mrc"), "{folder}/{name}.tlt", "C_{name}"]
+                           for name in "ab")])
+    printed = harness.succeed("batch", table, *QUICK, "--dry-run", "-o", folder).stdout
+    assert "C_a: " in printed and "C_b: " in printed, printed
 
 
 def test_a_batch_makes_halves(data):
@@ -177,7 +189,7 @@ def test_a_series_that_fails_does_not_stop_the_others(data, first):
         assert harness.read_volume(volume).shape == (16, SIZE, SIZE)
         assert float(line["core_seconds"]) > 0 and float(line["wall_seconds"]) > 0
         assert 0.01 < float(line["peak_GiB"]) < 2
-        assert line["verdict"].startswith("verdict: residual")
+        assert line["verdict"].startswith("residual")
         assert "harness" not in line["warnings"]
     by_hand = os.path.join(harness.fresh_directory("by_hand"), "a.mrc")
     harness.succeed("reconstruct", os.path.join(data, "a.mrc"), "--tlt",
@@ -226,6 +238,48 @@ def test_finished_series_are_skipped_and_others_are_tried_again(data, first):
     assert os.stat(os.path.join(folder, "a.mrc")).st_mtime_ns == written
     assert harness.read_bytes(os.path.join(folder, "a.mrc")) == before
     assert options_of(os.path.join(folder, "c.mrc"))["input"]["exclude"] == "3"
+
+
+def test_results_that_cannot_be_read_are_not_finished(data, first):
+    folder = harness.fresh_directory("unreadable")
+    for file in os.listdir(first[0]):
+        if file[0] in "ab" and os.path.isfile(os.path.join(first[0], file)):
+            shutil.copy(os.path.join(first[0], file), folder)
+    whole = {name: harness.read_bytes(os.path.join(folder, name)) for name in ("a.mrc", "b.json")}
+    command = ["batch", os.path.join(data, "[ab].mrc"), *pattern(data)[1:], *QUICK,
+               "--skip-existing", "-o", folder]
+    for name in whole:
+        open(os.path.join(folder, name), "wb").close()
+        other = "b.mrc'" if name[0] == "a" else "a.mrc'"
+        said = harness.tomofield(*command)
+        assert said.returncode == 2 and other not in said.stderr, said.stderr
+        for part in (os.path.join(folder, name), f"'{name}'", f"'{name[0]}.h5'", "remove ", "again"):
+            assert part in said.stderr, (part, said.stderr)
+        pathlib.Path(folder, name).write_bytes(whole[name])
+    assert harness.succeed(*command).stdout.count("its results are there") == 2
+
+
+def test_an_odd_file_of_a_series_is_to_be_removed(data, first):
+    """`--overwrite` and `-o`, which a run advises, are those of the whole batch."""
+    folder = harness.fresh_directory("odd")
+    command = ["batch", os.path.join(data, "[ab].mrc"), *pattern(data)[1:], *QUICK, "-o", folder]
+    for name, continues in (("b.json", False), ("b.json", True), ("b.h5", True)):
+        with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
+            file.write("odd")
+        said = harness.tomofield(*command, *(["--skip-existing"] if continues else []))
+        assert said.returncode == (1 if name == "b.h5" else 2), said.stderr  # when b runs
+        assert "--overwrite" not in said.stderr and f"remove '{name}'" in said.stderr, said.stderr
+        assert f" from '{folder}'" in said.stderr, said.stderr
+        os.remove(os.path.join(folder, name))
+
+
+def test_a_pattern_without_quotes_is_answered_with_quotes(data):
+    files = [os.path.join(data, f"{name}.mrc") for name in "abc"]
+    folder = harness.fresh_directory("unquoted")
+    said = harness.tomofield("batch", *files, *pattern(data)[1:], *QUICK, "-o", folder)
+    assert said.returncode == 2 and "put a pattern in quotes" in said.stderr, said.stderr
+    said = harness.tomofield("batch", files[0], "nowhere", *QUICK, "-o", folder)
+    assert "'nowhere' belongs to no option" in said.stderr, said.stderr
 
 
 def test_a_table_gives_each_series_its_own_options(data):
@@ -325,6 +379,14 @@ def test_all_mistakes_are_found_before_anything_starts(data):
     nothing = harness.tomofield("batch", a, "--tlt", tlt, "-o", results)
     assert nothing.returncode == 2 and "--thickness" in nothing.stderr
     assert "'maybe'" in refusal(["stack", "invert"], [a, "maybe"])
+    said = refusal(["stack", "thicknes", "tlt", "output", "invert"],
+                   [a, 12, "{foldr}/a.tlt", "", ""], [a, 12, tlt, "{nam}.mrc", "maybe"])
+    for part in ("did you mean 'thickness'", "'maybe'", "'{foldr}'", "'{nam}'", "same name 'a'"):
+        assert part in said, (part, said)
+    said = refusal(["stack", "tlt", "bin", "output"], [a, tlt, "0", ""],
+                   *([f"{a[:-5]}{name}.mrc", tlt, "", os.path.join(results, "x" + ending)]
+                     for name, ending in (("b", ".mrc"), ("c", ".rec"))))
+    assert "--bin" in said and "would both write" in said, said
     assert "'stack'" in refusal(["name"], ["x"])
     small_job = {**os.environ, "SLURM_JOB_ID": "1", "SLURM_MEM_PER_NODE": "8"}  # MiB
     assert "a needs about" in refusal(["stack", "tlt"], [a, tlt], env=small_job)

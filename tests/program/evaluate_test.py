@@ -79,6 +79,17 @@ def random_pair(shape, seed):
     return reconstruction.astype(np.float32), truth.astype(np.float32)
 
 
+def test_opposite_contrast_is_said():
+    truth = np.random.default_rng(3).random((12, 16, 16))
+    files = [save(name, volume) for name, volume in (
+        ("inverted.mrc", 2 - 3 * truth), ("same.mrc", truth + 1),
+        ("other.mrc", np.random.default_rng(4).random(truth.shape)), ("truth_3.mrc", truth))]
+    for file in files[:3]:
+        said = run(file, files[3])
+        assert said.returncode == 0, said.stderr
+        assert ("opposite contrast" in said.stdout) == (file == files[0]), said.stdout
+
+
 def test_random_volumes_against_scikit_image():
     for seed, shape in enumerate([(20, 64, 50), (7, 41, 33), (31, 7, 90)]):
         reconstruction, truth = random_pair(shape, seed)

@@ -5,6 +5,8 @@ import os
 import pathlib
 import re
 
+import pytest
+
 import harness
 
 PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs/options.md"
@@ -46,6 +48,41 @@ def test_help_all_has_every_option_of_the_page():
     assert options_in(text) == page | COMMON | {"--trace", "--series", "--plan", "--choice",
                                                "--batch-choice", "--grid"}, options_in(text) ^ page
     assert max(map(len, text.splitlines())) <= 100
+
+
+COMMANDS = (["reconstruct"], ["align"], ["baseline", "tv"], ["baseline", "tensorf"], ["export"],
+            ["view"], ["evaluate"], ["compare"], ["batch"], ["simulate"], ["info"])
+
+
+@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
+def test_help_of_every_command_has_its_example_and_whole_phrases(words):
+    for flag in ("--help", "--help-all"):
+        text = harness.succeed(*words, flag).stdout
+        assert f"Example: tomofield {' '.join(words)} " in text, text
+        assert text.count("Example: ") == 1, text
+        options = text.split("\n\n", 1)[1]
+        assert flag == "--help-all" or options.count("(") == options.count(")"), text
+        assert not re.search(r"\b(INT|UINT|FLOAT)\b|[:|]\{", text), text
+
+
+def test_short_help_says_more_than_one_word():
+    text = " ".join(harness.succeed("simulate", "--help").stdout.split())
+    for part in ("--thickness N Thickness in voxels (default: 150; with --yardstick 75/128 of --size, "
+                 "with --yardstick d 1120 Å)", "(with --yardstick d)",
+                 "--contrast dark|bright Contrast of the views (default: bright)"):
+        assert part in text, text
+    assert "--also NAME=COMMAND A method of your own" in " ".join(
+        harness.succeed("compare", "--help").stdout.split())
+    assert "Smoothness: light, medium" in harness.succeed("reconstruct", "--help").stdout
+
+
+def test_a_misspelt_command_is_answered_with_the_nearest():
+    for words, like in ((["recon"], "reconstruct"), (["evalute"], "evaluate"),
+                        (["baseline", "sirtt"], "sirt"), (["zzz"], None)):
+        said = harness.tomofield(*words, "x.mrc")
+        assert said.returncode == 2, said
+        assert ("did you mean" in said.stderr) == (like is not None), said.stderr
+        assert like is None or f"(did you mean {like}?)" in said.stderr, said.stderr
 
 
 def test_help_of_the_program_names_help_all():

@@ -51,6 +51,18 @@ CALLS = {
     "the output is a path, a str": lambda m, s: tomofield.write_mrc(3, VIEWS, 2.0),
     "the record is a path": lambda m, s: tomofield.read_record(3),
     "the number of threads is a whole number": lambda m, s: tomofield.set_thread_count("two"),
+    "method is a text, not ['wbp']": lambda m, s: tomofield.baseline(s, ["wbp"]),
+    "the method 'ingp' does not take resume, epochs, denoise, tune: leave them out":
+        lambda m, s: tomofield.baseline(s, "ingp", resume=True, epochs=3, denoise="strong",
+                                        tune=True),
+    "the method 'wbp' does not take even: leave it out": lambda m, s: tomofield.baseline(
+        s, "wbp", even="x.mrc"),
+    "level is 'found' or two angles in degrees, (pitch, x_tilt), not '12'":
+        lambda m, s: tomofield.export(m, "x.mrc", level="12"),
+    "not ('3', '2')": lambda m, s: tomofield.export(m, "x.mrc", level=("3", "2")),
+    "not (True, False)": lambda m, s: tomofield.export(m, "x.mrc", level=(True, False)),
+    "not {1: 1, 2: 2}": lambda m, s: tomofield.export(m, "x.mrc", level={1: 1, 2: 2}),
+    "voxel_px is a number, not (1+2j)": lambda m, s: m.region(np.complex64(1 + 2j)),
     "the threshold is a number, not 'x'": lambda m, s: tomofield.correlate_shells(
         np.random.default_rng(1).random((8, 8, 8)), np.random.default_rng(2).random((8, 8, 8)),
         1.0).resolution_A("x"),
@@ -65,12 +77,42 @@ def test_a_wrong_type_is_answered_with_what_to_give(series, model, said):
     assert said in text and "incompatible" not in text and "\n" not in text, text
 
 
+MASKED = np.ma.masked_array(np.ones((3, 8, 8)), mask=np.arange(192).reshape(3, 8, 8) == 5)
+MASKED_ELEMENTS = "an array with masked elements"
+SENTENCES = (
+    ("the number of threads must be from 1 to 1024", lambda m: tomofield.set_thread_count(-1)),
+    ("or 0 for the default, not 1000000", lambda m: tomofield.set_thread_count(10**6)),
+    ("too little memory", lambda m: tomofield.score_volume(  # of 2 EiB, which no machine has
+        *2 * [np.broadcast_to(np.float64(1), (1 << 20, 1 << 20, 1 << 19))])),
+    (MASKED_ELEMENTS, lambda m: tomofield.reconstruct(MASKED, TILTS, pixel_size_A=1, thickness=4)),
+    (MASKED_ELEMENTS, lambda m: tomofield.reconstruct(
+        VIEWS, np.ma.masked_array(TILTS, mask=[0, 0, 1]), pixel_size_A=1, thickness=4)),
+    (MASKED_ELEMENTS, lambda m: m.sample_points(np.ma.masked_array([[1, 2, 3]], mask=True))),
+    (MASKED_ELEMENTS, lambda m: tomofield.score_volume(VIEWS, MASKED)),
+    (MASKED_ELEMENTS, lambda m: tomofield.write_mrc("x.mrc", MASKED, 1.0)),
+    ("no masked voxels", lambda m: tomofield.Tomogram(MASKED, 1.0)),
+)
+
+
+@pytest.mark.parametrize("said, call", SENTENCES)
+def test_what_cannot_be_used_is_refused_in_a_sentence(model, said, call):
+    with pytest.raises(tomofield.Error, match=said):
+        call(model)
+
+
+def test_errors_say_what_they_are():
+    assert "what to do" in tomofield.Error.__doc__
+
+
 def test_numbers_and_paths_of_every_kind_are_taken(series, model):
     assert model.region(np.float32(2)).size == model.region(2).size == (16, 16, 8)
     for path in (str(series.folder / "truth.mrc"), bytes(series.folder / "truth.mrc"),
                  pathlib.Path(series.folder / "truth.mrc")):
         assert tomofield.read_mrc(path).shape == (16, 32, 32)
     tomofield.set_thread_count(np.int64(0))
+    whole = np.ma.masked_array(np.random.default_rng(1).random((8, 9, 10)), mask=False)
+    assert tomofield.score_volume(whole, whole).correlation == pytest.approx(1)
+    assert len(tomofield.Tomogram(whole, 1.0)) == 8
 
 
 @pytest.mark.parametrize("name, like", (

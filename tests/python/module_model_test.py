@@ -81,6 +81,32 @@ def test_ctrl_c_stops_a_long_sampling(model):
     timer.join()
 
 
+def cost(call, seconds=None):
+    """Returns the processor time of a call, which Ctrl-C ends after some seconds if they are given."""
+    begun = time.process_time()
+    if seconds is None:
+        call()
+        return time.process_time() - begun
+    timer = threading.Timer(seconds, _thread.interrupt_main)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        call()
+    timer.join()
+    return time.process_time() - begun
+
+
+def test_ctrl_c_stops_the_sampling_of_many_points(model):
+    points = np.full((1 << 23, 3), 8.0)
+    whole = cost(lambda: model.sample_points(points))
+    assert cost(lambda: model.sample_points(points), 0.05) < whole / 2
+
+
+def test_ctrl_c_stops_before_there_is_memory_for_a_large_box(model):
+    box = tomofield.Box((16, 16, 8), (1200, 1200, 200))
+    whole = cost(lambda: model.sample(box))
+    assert cost(lambda: model.sample(box), 0.05) < whole / 2
+
+
 def test_threads_export_at_the_same_time(model, tmp_path):
     """The results of one thread are not those of another."""
     failures = []

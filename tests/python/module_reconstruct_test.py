@@ -268,3 +268,33 @@ last = Last()
         ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
                                env={**os.environ, "PYTHONPATH": module}, timeout=60, check=False)
         assert ended.returncode == 0, (ended.returncode, ended.stderr)
+
+
+def test_a_process_that_is_forked_beside_a_reconstruction_ends():
+    """It has none of its parent's threads, for which it would wait in vain."""
+    script = """
+import os, sys, threading, time
+import numpy as np
+import tomofield
+views = np.random.default_rng(1).normal(100, 10, (21, 32, 32)).astype(np.float32)
+begun = threading.Event()
+threading.Thread(target=lambda: tomofield.reconstruct(
+    views, np.linspace(-60, 60, 21), epochs=10000, thickness=16, contrast="bright", pixel_size_A=10,
+    density_variation=1.0, prior="tv", progress=lambda progress: begun.set()), daemon=True).start()
+begun.wait()
+child = os.fork()
+if child == 0:
+    sys.exit(5)
+for _ in range(500):
+    ended, status = os.waitpid(child, os.WNOHANG)
+    if ended:
+        print("status", os.waitstatus_to_exitcode(status))
+        break
+    time.sleep(0.02)
+else:
+    os.kill(child, 9)
+"""
+    module = os.path.dirname(os.path.dirname(tomofield.__file__))
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
+                           env={**os.environ, "PYTHONPATH": module}, timeout=60, check=False)
+    assert ended.stdout == "status 5\n", (ended.stdout, ended.stderr)

@@ -15,6 +15,9 @@ project = tomofield.open_project("TS_01/", series="TS_01")
 made = tomofield.reconstruct(project, thickness=16, contrast="bright", progress=True)
 assert made.tomogram is not None and made.model is not None
 size: float = made.tomogram.voxel_size_A
+views, tilts = tomofield.read_mrc("s.mrc"), np.loadtxt("s.tlt")
+tomofield.reconstruct(views, tilts, pixel_size_A=10, thickness=16)
+tomofield.baseline(views, "wbp", [-3.0, 0.0, 3.0], pixel_size_A=10, thickness=16)
 mean = float(np.mean(made.tomogram))
 row: str = project.settings[0].row
 notes: list[str] = project.warnings

@@ -3,7 +3,9 @@
 import base64
 import io
 import json
+import pathlib
 import re
+import subprocess
 
 import mrcfile
 import numpy as np
@@ -243,16 +245,59 @@ def test_baselines_take_their_options_and_write_files(series, options, method, w
 
 
 @pytest.mark.parametrize("own, said", (
-    ({"iteration": 3}, r"sirt has no option 'iteration' \(did you mean iterations\?\)"),
-    ({"window": "hann"}, "sirt has no option 'window'.*relaxation"),
     ({"iterations": 0}, "--iterations must be a whole number above 0, not '0'"),
-    ({"iterations": 2.5}, "--iterations must be a whole number above 0, not '2.5'"),
-    ({"relaxation": "much"}, "--relaxation must be a number from 0.01 to 1.99, not 'much'"),
-    ({"non_negative": 3}, "--non-negative must be auto, on or off, not '3'"),
+    ({"relaxation": 3}, "--relaxation must be a number from 0.01 to 1.99, not '3.0'"),
     ({"ctf_correction": "none"}, "--ctf-correction must be flip or")))
-def test_options_that_a_method_has_not_are_named(series, options, own, said):
+def test_values_that_a_method_cannot_take_are_named(series, options, own, said):
     with pytest.raises(tomofield.Error, match=said):
         tomofield.baseline(series.folder / "s.mrc", "sirt", method_options=own, **options)
+
+
+@pytest.mark.parametrize("own, said", (
+    ({"iteration": 3}, r"'sirt' has no option 'iteration' \(did you mean iterations\?\)"),
+    ({"window": "hann"}, "'sirt' has no option 'window'.*relaxation"),
+    ({3: 3}, "the name of a method's option is a text, not 3"),
+    ({"ctf_correction": "flip", "ctf-correction": "flip"}, "have 'ctf-correction' twice"),
+    ({"iterations": 2.5}, "the option iterations is a whole number, not 2.5"),
+    ({"iterations": True}, "the option iterations is a whole number, not True"),
+    ({"iterations": "auto"}, "the option iterations is a whole number, not 'auto'"),
+    ({"relaxation": "much"}, "the option relaxation is a number, not 'much'"),
+    ({"relaxation": None}, "the option relaxation is a number, not None"),
+    ({"ctf_correction": True}, "the option ctf_correction is a text, not True"),
+    ({"non_negative": 3}, "the option non_negative is True or False, not 3"),
+    ({"non_negative": None}, "the option non_negative is True or False, not None")))
+def test_options_of_methods_have_their_types(series, options, own, said):
+    with pytest.raises(TypeError, match=said):
+        tomofield.baseline(series.folder / "s.mrc", "sirt", method_options=own, **options)
+
+
+def test_options_of_methods_may_be_automatic(series, options):
+    def record(own):
+        made = tomofield.baseline(series.folder / "s.mrc", "tv", **options,
+                                  method_options={"iterations": np.int32(2), **own})
+        return made.options["method"]
+    automatic = {"weight": "auto", "penalty": "auto", "non_negative": "auto"}
+    assert record(automatic) == record({}) == record({"non_negative": np.bool_(True)})
+    assert record({"weight": np.float32(2)})["weight"] == 2
+
+
+def test_a_method_takes_the_options_of_its_command(series):
+    """What the command refuses, baseline() refuses, and the other way round."""
+    page = pathlib.Path(__file__).parents[2] / "docs" / "options.md"
+    rows = re.findall(r"^\| `([^`]+)` \|.*\| `(\w+)` \| `[\w.]+` \|$", page.read_text(), re.MULTILINE)
+    assert len(rows) > 80
+    for method in ("wbp", "ingp"):
+        text = subprocess.run([series.program, "baseline", method, "--help-all"], check=True,
+                              capture_output=True, text=True).stdout
+        groups = text.split("\nMethod:")  # a method may have an option of the same name
+        shared = groups[0] + groups[1].split("\n\n", 1)[1]
+        taken = set(tomofield._core.shared_options(method))
+        for flags, name in rows:
+            flag = flags.split(",")[-1]
+            if flag == "stack":
+                continue
+            has = re.search(rf"^  (-\w,)?{flag}[ \n]", shared, re.MULTILINE) is not None
+            assert (name in taken) == has, (method, flag)
 
 
 def test_baselines_can_be_stopped_and_refuse_what_they_cannot_do(series, options, tmp_path):

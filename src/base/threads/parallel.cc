@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <sched.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -109,16 +110,27 @@ class Threads {
   WorkerThreads workers_;
 };
 
-std::unique_ptr<Threads>& current_threads() {
-  static std::unique_ptr<Threads> threads;
+// Ends threads. A process that was forked has none of its parent's threads, and leaves alone what
+// they may have locked.
+struct EndThreads {
+  pid_t process = getpid();
+  void operator()(const Threads* threads) const {
+    if (process == getpid()) delete threads;
+  }
+};
+using OwnThreads = std::unique_ptr<Threads, EndThreads>;
+
+OwnThreads& current_threads() {
+  static OwnThreads threads;
   return threads;
 }
 
 Threads& threads() {
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
-  std::unique_ptr<Threads>& current = current_threads();
-  if (!current) current = std::make_unique<Threads>(choose_count());
+  OwnThreads& current = current_threads();
+  if (!current || current.get_deleter().process != getpid())
+    current = OwnThreads(new Threads(choose_count()));
   return *current;
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -148,8 +149,7 @@ void add_tune(CLI::App& command, BaselineArguments& arguments) {
 }
 
 void add_run_options(CLI::App& command, BaselineArguments& arguments) {
-  for (const char* key : {"running.output", "running.overwrite"})
-    add_row(command, key, arguments.choices);
+  for (const std::string_view key : baseline::kRunKeys) add_row(command, key, arguments.choices);
   command
       .add_flag("--dry-run", arguments.dry_run.is_wanted,
                 "Check everything and print the plan and the memory it needs")

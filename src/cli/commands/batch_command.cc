@@ -62,14 +62,24 @@ batch::ColumnKind kind_of_column(const CLI::App& reconstruct, const std::string&
                                                : batch::ColumnKind::kWithValue;
 }
 
-// Reads which series there are.
-std::vector<batch::Series> read_series(const CLI::App& program, const std::string& list) {
+// Returns what a table may do with the options of reconstruct.
+batch::KnownColumns known_columns(const CLI::App& reconstruct) {
+  batch::KnownColumns known{
+      .kind_of = [&](const std::string& flag) { return kind_of_column(reconstruct, flag); },
+      .names = {}};
+  for (const CLI::Option* option : reconstruct.get_options())
+    for (const std::string& name : option->get_lnames())
+      if (known.kind_of("--" + name) != batch::ColumnKind::kNotHere) known.names.push_back(name);
+  return known;
+}
+
+// Reads which series there are. Adds the mistakes of a table to `faults`.
+std::vector<batch::Series> read_series(const CLI::App& program, const std::string& list,
+                                       batch::Faults& faults) {
   const std::string ending = fs::path(list).extension().string();
   if (ending == ".star") return batch::read_star(list);
   if (ending != ".csv" && ending != ".tsv") return batch::expand_pattern(list);
-  const CLI::App& reconstruct = *program.get_subcommand("reconstruct");
-  return batch::read_table(
-      list, [&](const std::string& flag) { return kind_of_column(reconstruct, flag); });
+  return batch::read_table(list, known_columns(*program.get_subcommand("reconstruct")), faults);
 }
 
 // Returns the threads that all jobs share, or those of a task of a job array.
@@ -117,6 +127,9 @@ void print_choosing(const batch::JobList& list, const batch::ChoicePlan& plan) {
     print("with the other settings that they began with: {}\n", names_of(plan.differing));
   if (!plan.choosing.empty())
     print("trials of {} choose the total variation of all series first\n", names_of(plan.choosing));
+  if (plan.alone)
+    print("{} alone is left to choose: its own trials choose its total variation\n",
+          list.jobs[*plan.alone].name);
   flush_output();  // the choice comes before other output, in a file too
 }
 
@@ -217,8 +230,10 @@ void run(const CLI::App& command, const BatchArguments& arguments,
                              .skips_existing = arguments.skips_existing,
                              .overwrites = arguments.overwrites,
                              .stop_requested = stop_was_requested};
-  std::vector<batch::Series> series = read_series(*command.get_parent(), arguments.list);
-  settle_outputs(series, options);
+  batch::Faults faults;
+  std::vector<batch::Series> series = read_series(*command.get_parent(), arguments.list, faults);
+  settle_outputs(series, options, faults);
+  faults.require_none();
   const io::OutputFolder folder(options.folder);
   const io::OutputLock lock(batch::list_of(options.folder));
   batch::JobList list = plan_jobs(series, options);
@@ -257,6 +272,7 @@ void add_slurm_options(CLI::App& command, BatchArguments& arguments) {
   command
       .add_option("--sbatch", arguments.sbatch,
                   "Options of sbatch, as in '--partition=cpu --time=4:00:00'; may be repeated")
+      ->type_name("OPTIONS")
       ->allow_extra_args(false)
       ->needs(slurm)
       ->check(CLI::Validator(
@@ -277,11 +293,12 @@ std::vector<std::string> add_own_options(CLI::App& command, BatchArguments& argu
   command
       .add_option(
           "LIST", arguments.list,
-          "The series: a table (.csv, .tsv) with columns 'stack' and options of reconstruct, "
+          "A table of the series (.csv, .tsv) with columns 'stack' and options of reconstruct, "
           "RELION's tomograms.star, or a pattern in quotes, as in 'data/*.mrc'")
       ->required();
   command.add_option("-o,--output", arguments.folder, "Folder of the results and of the summary")
       ->required()
+      ->type_name("FOLDER")
       ->group(group);
   CLI::Option* skip = command
                           .add_flag("--skip-existing,--resume", arguments.skips_existing,

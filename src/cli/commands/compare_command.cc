@@ -124,15 +124,18 @@ std::vector<std::string> add_own_options(CLI::App& command, CompareArguments& ar
                   fmt::format("Methods to run, the main one first: some of {}",
                               fmt::join(compare::names_of(compare::known_methods()), ", ")))
       ->delimiter(',')
-      ->capture_default_str()
+      ->default_str(fmt::format("{}", fmt::join(arguments.names, ",")))
+      ->type_name("NAME,…")
       ->group(group);
   command
       .add_option("--also", arguments.others,
-                  "NAME=COMMAND: a method of your own, as in 'smooth=reconstruct --tv-penalty "
-                  "smooth'; may be repeated")
+                  "A method of your own, as in 'smooth=reconstruct --tv-penalty smooth'; may be "
+                  "repeated")
+      ->type_name("NAME=COMMAND")
       ->allow_extra_args(false)
       ->group(group);
   command.add_option("--truth", arguments.truth, "MRC volume to score all methods against")
+      ->type_name("FILE")
       ->group(group);
   command
       .add_flag("--tune", arguments.tune,
@@ -158,6 +161,7 @@ std::vector<std::string> add_own_options(CLI::App& command, CompareArguments& ar
                      group, arguments.profile);
   command.add_option("-o,--output", arguments.folder, "Folder of all results")
       ->required()
+      ->type_name("FOLDER")
       ->group(group);
   command
       .add_flag("--overwrite", arguments.overwrite, "Remove old results and run all methods again")

@@ -32,6 +32,9 @@ struct Findings {
   std::string profile_csv;
 };
 
+// Volumes with a correlation below this show the same with opposite signs.
+constexpr double kOppositeContrast = -0.3;
+
 void print_comparison(const evaluate::Comparison& comparison) {
   const auto& [psnr, ssim, box] = comparison;
   const base::Shape3 shape = box.shape();
@@ -40,6 +43,10 @@ void print_comparison(const evaluate::Comparison& comparison) {
   print("SSIM      {:8.5f}  {:8.5f}\n", ssim.raw, ssim.affine);
   print("correlation {:.5f}, scale {:.5f}, offset {:.5f}, peak {:.5f}\n", psnr.correlation,
         psnr.scale, psnr.offset, psnr.peak);
+  if (psnr.correlation < kOppositeContrast)
+    print(
+        "the volumes have opposite contrast: what is bright in one is dark in the other; --invert "
+        "of reconstruct and export turns one of them round\n");
   print("box {} × {} × {} voxels from {},{},{} of the truth\n", shape.nx, shape.ny, shape.nz,
         box.begin[0], box.begin[1], box.begin[2]);
 }

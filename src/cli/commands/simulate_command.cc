@@ -225,11 +225,13 @@ void add_misalignment_options(CLI::App& command, SimulateArguments& arguments) {
 
 void add_imaging_options(CLI::App& command, SimulateArguments& arguments) {
   simulate::Imaging& imaging = arguments.options.imaging;
-  CLI::Option* defocus = command.add_option(
-      "--defocus", arguments.defocus,
-      "Filter the views by a contrast transfer function, with an underfocus of low:high µm that is "
-      "drawn for each view (default: plain projections; with --yardstick d 2:4, drawn once, and "
-      "views scatter by 0.15 µm)");
+  CLI::Option* defocus = command.add_option("--defocus", arguments.defocus,
+                                            "Filter the views by a contrast transfer function, "
+                                            "with an underfocus in µm that is drawn for "
+                                            "each view (default: plain projections; with "
+                                            "--yardstick d 2:4, drawn once, and views scatter "
+                                            "by 0.15 µm)");
+  defocus->type_name("LOW:HIGH");
   command
       .add_option("--astigmatism", imaging.astigmatism_um,
                   "Difference between the two defoci of a view in µm; its direction is drawn")
@@ -280,7 +282,8 @@ void add_simulate_command(CLI::App& program) {
                         "The specimen continues outside the field of view, as in a microscope");
   CLI::Option* tilts = command->add_option(
       "--tilts", arguments->tilts,
-      "Tilt angles first:last:step in degrees (default: -70:69.5:1.5; with --extended -60:60:2)");
+      "Tilt angles in degrees (default: -70:69.5:1.5; with --extended -60:60:2)");
+  tilts->type_name("FIRST:LAST:STEP");
   add_enum_option<simulate::Yardstick>(
       *command, "--yardstick", arguments->yardstick,
       "Phantom that the benchmarks use. a: a cell that ends in the field of view, 94 views from "
@@ -293,8 +296,8 @@ void add_simulate_command(CLI::App& program) {
       ->excludes(extended, tilts);
   command
       ->add_option("--particles", arguments->particles,
-                   "With --yardstick d: an MRC density, in which high is dense, and the number of "
-                   "its particles in the field of view, in place of random proteins. Repeatable")
+                   "An MRC density, in which high is dense, and the number of its particles in the "
+                   "field of view, in place of random proteins (with --yardstick d). Repeatable")
       ->type_name("FILE,COUNT");
   command->add_option("--voxel-size", options.voxel_size_A, "Voxel size in Å")
       ->capture_default_str();
@@ -308,8 +311,10 @@ void add_simulate_command(CLI::App& program) {
                    "Attenuation per unit of density and Å (with --dose)")
       ->capture_default_str();
   command
-      ->add_option("--contrast", arguments->contrast,
-                   "bright: line integrals (default); dark: an empty beam minus the line integrals")
+      ->add_option(
+          "--contrast", arguments->contrast,
+          "Contrast of the views (default: bright). bright: line integrals; dark: an empty "
+          "beam minus the line integrals")
       ->check(CLI::IsMember({"dark", "bright"}));
   command->add_option(
       "--gain", arguments->gain_spread,

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "baseline/method_options.h"
@@ -24,8 +25,7 @@ std::array<std::int64_t, 3> voxels_of(const Sizes& sizes) {
 }  // namespace
 
 void add_shared_fit_options(CLI::App& command, option_table::Choices& choices) {
-  for (const char* key : {"fit.fit_view_scale", "field.margin_spacing", "fit.hold_out"})
-    add_row(command, key, choices);
+  for (const std::string_view key : baseline::kSharedFitKeys) add_row(command, key, choices);
 }
 
 void add_non_negative(CLI::App& command, std::optional<bool>& value) {

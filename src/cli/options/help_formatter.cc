@@ -84,18 +84,47 @@ std::string usage_of(const CLI::App& command, const std::string& name) {
   return usage + (has_commands ? " COMMAND\n" : "\n");
 }
 
+// Returns what stands for the value of an option. CLI11 has names of its own for types that the
+// option table calls N and NUMBER, and puts the words of a choice behind the type.
+std::string type_of(const CLI::Option& option) {
+  std::string type = option.get_type_name();
+  const std::size_t words = type.find(":{");
+  if (words != type.npos) {
+    std::string choice = type.substr(words + 2, type.size() - words - 3);
+    std::ranges::replace(choice, ',', '|');
+    type = type.starts_with("TEXT") ? choice : type.substr(0, words);
+  }
+  if (type == "INT" || type == "UINT") return "N";
+  return type == "FLOAT" ? "NUMBER" : type;
+}
+
 std::string name_of(const CLI::Option& option, bool is_positional) {
   std::string name = option.get_name(is_positional, true);
   if (option.get_items_expected_max() > 0 && !option.get_type_name().empty() && !is_positional)
-    name += " " + option.get_type_name();
+    name += " " + type_of(option);
   return name;
+}
+
+// Returns the beginning of a description: up to the end of its first clause outside of brackets
+// that has several words. A single word says too little.
+std::string first_clause(const std::string& text) {
+  int depth = 0;
+  bool has_words = false;
+  for (std::size_t i = 0; i + 1 < text.size(); ++i) {
+    const char c = text[i];
+    depth += (c == '(') - (c == ')');
+    if (depth != 0) continue;
+    const bool is_end = (c == '.' || c == ':' || c == ';') && text[i + 1] == ' ';
+    if (is_end && has_words) return text.substr(0, i);
+    has_words = has_words || c == ' ';
+  }
+  return text;
 }
 
 // Returns an option with the beginning of its description, and its notes if they are few.
 std::string short_entry(const CLI::Option& option) {
   constexpr std::size_t kMostNotes = 45;
-  std::string text = option.get_description();
-  for (const char* end : {". ", ": ", "; "}) text.erase(std::min(text.find(end), text.size()));
+  std::string text = first_clause(option.get_description());
   const std::string notes = notes_of(option);
   if (width_of(notes) <= kMostNotes) text += notes;
   return entry(name_of(option, option.get_positional()), text);

@@ -39,6 +39,22 @@ std::string fault_of_option(const CLI::App& command, const std::string& word) {
   return fmt::format("{} (did you mean {}?)", sentence, fmt::join(nearest, " or "));
 }
 
+// Returns a sentence on files beyond the one list that a command takes: those of a pattern that the
+// shell has filled in. Returns an empty text if the words are something else.
+std::string fault_of_pattern(const CLI::App& command, const std::vector<std::string>& words) {
+  const auto exists = [](const std::string& word) {
+    std::error_code fault;
+    return std::filesystem::exists(word, fault);
+  };
+  if (command.get_option_no_throw("LIST") == nullptr || !std::ranges::all_of(words, exists))
+    return {};
+  return fmt::format(
+      "'{}'{} beside the list: put a pattern in quotes, as in 'data/*.mrc', so that the shell does "
+      "not fill it in",
+      words.front(),
+      words.size() == 1 ? " is" : fmt::format(" and {} more files are", words.size() - 1));
+}
+
 // Returns a sentence on the words that the command does not know, in their order, or an empty text.
 std::string fault_of_unknown_words(const CLI::App& command,
                                    const std::vector<std::string>& arguments) {
@@ -49,11 +65,12 @@ std::string fault_of_unknown_words(const CLI::App& command,
     if (is_option(word))
       options.push_back(fault_of_option(command, word));
     else
-      words.push_back(fmt::format("'{}'", word));
+      words.push_back(word);
   }
   if (!options.empty()) return fmt::format("{}", fmt::join(options, "; "));
   if (words.empty()) return {};
-  return fmt::format("{} {} to no option", fmt::join(words, ", "),
+  if (std::string fault = fault_of_pattern(command, words); !fault.empty()) return fault;
+  return fmt::format("'{}' {} to no option", fmt::join(words, "', '"),
                      words.size() == 1 ? "belongs" : "belong");
 }
 

@@ -20,6 +20,17 @@ namespace {
 constexpr std::int64_t kPartValues = std::int64_t{1} << 22;
 constexpr std::int64_t kBlock = 16;  // rows of a turned box
 
+// Returns zeros. The system takes seconds to give memory for many, in which the caller may stop.
+std::vector<float> zeros(std::size_t count) {
+  std::vector<float> values;
+  values.reserve(count);
+  while (values.size() < count) {
+    base::allow_interruption();
+    values.resize(std::min(count, values.size() + static_cast<std::size_t>(kPartValues)));
+  }
+  return values;
+}
+
 // Returns the number of sections of an aligned box whose rows are sampled at once.
 std::int64_t sections_at_once(const OrientedBox& box, std::int64_t num_rows) {
   return std::clamp(kPartValues / (num_rows * box.size[0]), std::int64_t{1}, box.size[2]);
@@ -191,7 +202,7 @@ void require_memory_of(const OrientedBox& box) {
 std::vector<float> gather_box(const OrientedBox& box, const BoxSource& source) {
   require_memory_of(box);
   const auto [nx, ny, nz] = box.size;
-  std::vector<float> volume(static_cast<std::size_t>(nx * ny * nz));
+  std::vector<float> volume = zeros(static_cast<std::size_t>(nx * ny * nz));
   source([&, nx = nx, ny = ny](const BoxPart& part) {
     const auto rows = static_cast<std::ptrdiff_t>(part.num_rows * nx);
     for (std::int64_t s = 0; s < part.num_sections; ++s) {
@@ -203,11 +214,12 @@ std::vector<float> gather_box(const OrientedBox& box, const BoxSource& source) {
 }
 
 std::vector<float> sample_points(const Field& field, std::span<const Point> points) {
-  std::vector<float> values(points.size());
+  std::vector<float> values = zeros(points.size());
   constexpr std::int64_t kBatch = 1024;
   const auto count = std::ssize(points);
   base::parallel_for("sample points", (count + kBatch - 1) / kBatch, [&](std::int64_t batch) {
     const std::int64_t end = std::min(count, (batch + 1) * kBatch);
+    base::allow_interruption();
     for (auto i = static_cast<std::size_t>(batch * kBatch); i < static_cast<std::size_t>(end); ++i)
       values[i] = static_cast<float>(field.density(points[i][0], points[i][1], points[i][2]));
   });
