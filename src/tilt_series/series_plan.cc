@@ -12,7 +12,7 @@
 #include "base/plausible.h"
 #include "geometry/raw_from_aligned.h"
 #include "io/images/mrc.h"
-#include "io/images/mrc_facts.h"
+#include "io/images/mrc_format.h"
 #include "io/saving/scratch_memory.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/view_table.h"
