@@ -65,6 +65,20 @@ TEST(Jobs, OfADamagedListAreRefused) {
   }
 }
 
+TEST(Jobs, AreCalledAfterNoOtherFolder) {
+  const ScratchDirectory directory;
+  for (const char* name : {"/tmp/evil", "../../evil", "a/b", "..", ".", ""}) {
+    JobList list;
+    list.jobs.emplace_back().name = name;
+    write_jobs(directory / "batch.json", list);
+    EXPECT_NE(testing::message_of<Error>([&] {
+                read_jobs(directory / "batch.json");
+              }).find(std::string("'") + name + "'"),
+              std::string::npos)
+        << name;
+  }
+}
+
 TEST(Jobs, HaveTheirOwnFilesToRemoveInPlaceOfTheAdviceOfARun) {
   const ScratchDirectory directory;
   for (const char* name : {"a.h5", "a_xy.png", "b.json"}) directory.write(name, "");
