@@ -164,7 +164,7 @@ constexpr Row kRows[] = {
     // Specimen
     {.key = "specimen.thickness", .flag = "--thickness", MEMBER(options.specimen, thickness),
      .group = Group::kSpecimen, .unit = kUnbinned, .range = Range::between(1, 1e6),
-     .automatic = "that of a project", .help = "Thickness of the tomogram along Z", .is_common = true},
+     .help = "Thickness of the tomogram along Z", .is_common = true, .is_required = true},
     {.key = "specimen.roi", .flag = "--roi", MEMBER(options.specimen, roi), .group = Group::kSpecimen,
      .label = "X0,Y0,X1,Y1", .unit = kUnbinned, .automatic = "the whole field of view",
      .help = "Region of interest at zero tilt; X1 and Y1 lie outside",
@@ -384,7 +384,7 @@ bool Range::contains(double value) const {
   const bool is_between = value >= low && value <= high;
   switch (kind) {
     case Kind::kAny:
-      return base::is_plausible(value);
+      return true;
     case Kind::kBetween:
       return is_between;
     case Kind::kZeroOrBetween:

@@ -306,6 +306,23 @@ std::string label_of(const Row& row) {
 
 bool is_flag(const Row& row) { return std::holds_alternative<Reference<bool>>(row.member); }
 
+namespace {
+
+// Returns what is wrong with a number that is out of its range.
+template <typename Number>
+std::string range_fault(const Row& row, Number number, const Choices& choices) {
+  const std::string flag(flag_of(row.key)), range = row.range.text();
+  if (text_of(row, {}) == text_of(row, choices))  // a default that stands for no value
+    return fmt::format("{} is required: it must be {}", flag, range);
+  const auto as_real = static_cast<double>(number);
+  const bool is_huge =
+      std::isfinite(as_real) && as_real > base::kLargestNumber && !row.range.has_upper_limit();
+  return fmt::format("{} must be {}{}, not {}", flag, range.empty() ? "a finite number" : range,
+                     is_huge ? fmt::format(" and at most {:g}", base::kLargestNumber) : "", number);
+}
+
+}  // namespace
+
 std::vector<std::string> range_faults(const Options& options) {
   std::vector<std::string> faults;
   const Choices choices{{}, options};
@@ -314,19 +331,8 @@ std::vector<std::string> range_faults(const Options& options) {
       using Value = typename Plain<T>::type;
       if constexpr (kIsNumber<Value>) {
         const auto require = [&](Value number) {
-          if (row.range.contains(static_cast<double>(number))) return;
-          const Choices usual;
-          if (text_of(row, usual) == text_of(row, choices)) {  // a default that stands for no value
-            faults.push_back(
-                fmt::format("{} is required: it must be {}", flag_of(row.key), row.range.text()));
-            return;
-          }
-          const auto as_real = static_cast<double>(number);
-          const bool is_huge = std::isfinite(as_real) && as_real > base::kLargestNumber &&
-                               !row.range.has_upper_limit();
-          faults.push_back(fmt::format(
-              "{} must be {}{}, not {}", flag_of(row.key), row.range.text(),
-              is_huge ? fmt::format(" and at most {:g}", base::kLargestNumber) : "", number));
+          if (!row.range.contains(static_cast<double>(number)))
+            faults.push_back(range_fault(row, number, choices));
         };
         if constexpr (kIsOptional<T>) {
           if (value.has_value()) require(*value);

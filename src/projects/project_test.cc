@@ -402,7 +402,8 @@ TEST(MdocProject, SetsTheTargetOfTheDefocusWhereNothingMeasuresIt) {
   const auto set_by = [&](const std::string& text) {
     std::string all;
     const auto mdoc = folder.write("TS.mdoc", text);
-    for (const Setting& setting : read_project({.path = mdoc})->settings())
+    const Project project = read_project({.path = mdoc}).value();
+    for (const Setting& setting : project.settings())
       if (setting.option == "--defocus" || setting.option == "--ctf")
         all += setting.option + " " + setting.value + " " + setting.entry;
     return all;
