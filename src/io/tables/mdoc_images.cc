@@ -31,8 +31,9 @@ bool is_image(const fs::path& path) {
 std::vector<fs::path> images_in(const fs::path& folder) {
   std::vector<fs::path> images;
   std::error_code failure;
-  for (const auto& entry : fs::directory_iterator(folder, failure))
-    if (is_image(entry.path())) images.push_back(entry.path());
+  const fs::path where = folder.empty() ? fs::path(".") : folder;  // of a file that is named alone
+  for (const auto& entry : fs::directory_iterator(where, failure))
+    if (is_image(entry.path())) images.push_back(folder / entry.path().filename());
   if (failure)
     throw Error(
         fmt::format("the folder '{}' cannot be read: {}", folder.string(), failure.message()));
