@@ -16,6 +16,7 @@
 #include "cli/options/help_formatter.h"
 #include "cli/options/number_checks.h"
 #include "cli/options/place_options.h"
+#include "cli/options/project_options.h"
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
 #include "compare/comparison.h"
@@ -83,8 +84,9 @@ ExitStatus stopped(compare::Outcome outcome, const CompareArguments& arguments) 
                       arguments.folder, arguments.overwrite ? " without --overwrite" : "")};
 }
 
-void run(const CLI::App& command, const CompareArguments& arguments,
+void run(const CLI::App& command, CompareArguments& arguments,
          const std::vector<std::string>& own_options) {
+  open_project(command, arguments.choices);  // each method opens it, too
   compare::CompareOptions options;
   options.program = base::program_path();
   options.files = arguments.choices.files;

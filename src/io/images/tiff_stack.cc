@@ -277,14 +277,15 @@ class TiffStack : public ImageStack {
     const TiffFile file(path_);
     format_ = file.format(0);
     header_.voxel_size_A = {format_.pixel_width_A, format_.pixel_height_A, format_.pixel_width_A};
-    do {
+    for (;;) {
       const PageFormat of_page = file.format(pages_.size());
       if (of_page != format_) refuse(file, of_page);
       pages_.push_back(TIFFCurrentDirOffset(file.handle()));
       if (pages_.size() > kMostPages) file.fail("has more pages than any tilt series");
-    } while (TIFFReadDirectory(file.handle()) != 0);
-    if (TIFFLastDirectory(file.handle()) == 0)
-      file.fail(fmt::format("is truncated or damaged after page {}", pages_.size()));
+      if (TIFFLastDirectory(file.handle()) != 0) break;
+      if (TIFFReadDirectory(file.handle()) == 0)
+        file.fail(fmt::format("is truncated or damaged after page {}", pages_.size()));
+    }
     header_.nx = format_.width;
     header_.ny = format_.height;
     header_.nz = std::ssize(pages_);
