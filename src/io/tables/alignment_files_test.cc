@@ -1,5 +1,6 @@
 #include "io/tables/alignment_files.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "expect_parts.h"

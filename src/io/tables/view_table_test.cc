@@ -109,7 +109,8 @@ TEST(RelionTomograms, HaveSizesOfWholePixelsOrNone) {
                                      {"64 48 2.5", "rlnTomoSizeZ"},
                                      {"-64 48 20", "rlnTomoSizeX"},
                                      {"64 0.5 20", "rlnTomoSizeY"}})
-    expect_parts(message_of<Error>([&] { size_of(size); }), {"tomograms.star", "TS_01", column});
+    expect_parts(message_of<Error>([&, size = size] { size_of(size); }),
+                 {"tomograms.star", "TS_01", column});
 }
 
 TEST(ViewTable, RefusesTextInPlaceOfANumber) {
