@@ -126,6 +126,23 @@ def test_a_store_into_which_others_put_something_stays(finished, version):
     assert "is not of the new" in harness.succeed(*plain).stderr
 
 
+def test_a_store_is_replaced_beside_other_files_of_a_run_and_by_a_batch(tmp_path):
+    """A store is a folder, which no check of the other files takes for a file that cannot be written."""
+    harness.succeed("simulate", "s", "--size", 32, "--thickness", 16, cwd=tmp_path)
+    options = ["--thickness", 16, "--contrast", "bright", "--no-margin", "--epochs", 2, "--tv", 5,
+               "--coarse-epochs", 2, "--prior", "tv", "--zarr", "--overwrite"]
+    series = ["s/tilt_series.mrc", "--tlt", "s/tilt_series.tlt"]
+    for extra in ([], ["--trace", "t.json"], ["--plan", "p.json"]):
+        harness.succeed("reconstruct", *series, *options, "-o", "a.mrc", *extra, cwd=tmp_path)
+    for flag in ("--trace", "--plan", "--choice", "--grid"):  # no result of the run itself
+        refused = harness.tomofield("reconstruct", *series, *options, "-o", "a.mrc", flag, "a.mrc",
+                                    *(["--dry-run"] if flag == "--grid" else []), cwd=tmp_path)
+        assert refused.returncode == 2 and "two results would both be" in refused.stderr, refused
+    (tmp_path / "list.csv").write_text("stack,tlt\ns/tilt_series.mrc,s/tilt_series.tlt\n", "utf-8")
+    for _ in range(2):
+        harness.succeed("batch", "list.csv", *options, "-o", "out", cwd=tmp_path)
+
+
 # Debian's python3-zarr does not know the final version 3, so this reads it by the specification
 # (zarr-specs.readthedocs.io, core specification of version 3; ngff.openmicroscopy.org 0.5).
 

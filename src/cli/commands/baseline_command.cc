@@ -6,7 +6,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "base/threads/parallel.h"
@@ -103,18 +102,17 @@ void run(const CLI::App& command, BaselineArguments& arguments) {
   baseline::settle(options);
   const baseline::MethodFacts method = baseline::facts_of(options.method);
   const output::OutputPaths paths = output::output_paths(files.output);
-  const auto check_extra_files = [&] {
-    for (const auto& [file, flag] :
-         {std::pair{arguments.trace, "--trace"}, std::pair{arguments.dry_run.grid, "--grid"}})
-      check_extra_file(file, flag, {paths.volume, paths.json}, options.files, files.overwrite);
+  const auto check_files_beside = [&] {
+    check_extra_files({{arguments.trace, "--trace"}, {arguments.dry_run.grid, "--grid"}},
+                      {paths.volume, paths.json}, options.files, files.overwrite);
   };
   if (arguments.dry_run.is_wanted) {
     baseline::check_options(options);
-    check_extra_files();
+    check_files_beside();
     return rehearse(options, method, arguments.dry_run);
   }
   const std::vector<io::OutputLock> locks = baseline::claim_outputs(options);
-  check_extra_files();
+  check_files_beside();
   run_traced(arguments.trace, distributed::Communicator::alone(),
              [&] { run_method(options, method, paths); });
 }

@@ -46,14 +46,11 @@ void run(const CLI::App& command, ReconstructArguments& arguments,
   options::ReconstructOptions options =
       options::run_options(arguments.choices.files, arguments.choices.options);
   processes.run_collectively([&] {
-    const auto check = [&](const std::optional<std::filesystem::path>& file, const char* flag) {
-      check_extra_file(file, flag, reconstruction::result_files(options), options.files,
-                       options.run.overwrite);
-    };
-    check(arguments.plan, "--plan");
-    check(arguments.choice, "--choice");
-    check(arguments.trace, "--trace");
-    check(arguments.dry_run.grid, "--grid");
+    check_extra_files({{arguments.plan, "--plan"},
+                       {arguments.choice, "--choice"},
+                       {arguments.trace, "--trace"},
+                       {arguments.dry_run.grid, "--grid"}},
+                      reconstruction::result_files(options), options.files, options.run.overwrite);
   });
   if (arguments.plan) return write_plan(*arguments.plan, options, processes);
   run_traced(arguments.dry_run.is_wanted ? std::nullopt : arguments.trace, processes, [&] {

@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <utility>
 
 #include "base/check.h"
 #include "baseline/neural/tensorf.h"
@@ -48,10 +47,8 @@ void run(const CLI::App& command, TensorfArguments& arguments) {
         *arguments.non_negative ? Activation::kSoftplus : Activation::kIdentity;
   options::ReconstructOptions options = options::run_options(arguments.choices.files, requested);
   const output::OutputPaths paths = output::output_paths(options.run.output);
-  for (const auto& [file, flag] :
-       {std::pair{arguments.trace, "--trace"}, std::pair{arguments.dry_run.grid, "--grid"}})
-    check_extra_file(file, flag, {paths.volume, paths.model, paths.json}, options.files,
-                     options.run.overwrite);
+  check_extra_files({{arguments.trace, "--trace"}, {arguments.dry_run.grid, "--grid"}},
+                    {paths.volume, paths.model, paths.json}, options.files, options.run.overwrite);
   base::require_no_faults(options.faults());
   options.field.leaf_size = size_of_node(options);
   run_traced(arguments.dry_run.is_wanted ? std::nullopt : arguments.trace,

@@ -41,15 +41,18 @@ std::vector<option_table::GivenOption> given_options(const CLI::App& command,
   return given;
 }
 
-void check_extra_file(const std::optional<std::filesystem::path>& file, const char* flag,
-                      std::vector<std::filesystem::path> results, const SeriesFiles& input,
-                      bool may_replace) {
-  if (!file) return;
-  io::check_output_files(
-      {*file}, io::input_files(input), may_replace,
-      fmt::format("give another name with {}, or --overwrite to replace it", flag));
-  results.push_back(*file);
-  io::check_output_files(results, {}, true, {});
+void check_extra_files(std::initializer_list<ExtraFile> files,
+                       const std::vector<std::filesystem::path>& results, const SeriesFiles& input,
+                       bool may_replace) {
+  for (const auto& [file, flag] : files) {
+    if (!file) continue;
+    io::check_output_files(
+        {*file}, io::input_files(input), may_replace,
+        fmt::format("give another name with {}, or --overwrite to replace it", flag));
+    std::vector<std::filesystem::path> all = results;
+    all.push_back(*file);
+    io::require_distinct(all);
+  }
 }
 
 const CLI::App* find_command(const CLI::App& program, const std::vector<std::string>& arguments) {

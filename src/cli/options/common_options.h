@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
 #include <string>
 #include <vector>
@@ -45,11 +46,16 @@ CLI::Option* add_enum_option(CLI::App& command, const std::string& flag, Target&
 std::vector<option_table::GivenOption> given_options(const CLI::App& command,
                                                      const std::vector<std::string>& except);
 
-/// Checks a file that an option asks for beside the results of a run, such as --trace. Throws Error
-/// if it is an input or a result, or exists and may not be replaced.
-void check_extra_file(const std::optional<std::filesystem::path>& file, const char* flag,
-                      std::vector<std::filesystem::path> results, const SeriesFiles& input,
-                      bool may_replace);
+/// A file that an option asks for beside the results of a run, such as --trace.
+struct ExtraFile {
+  const std::optional<std::filesystem::path>& file;
+  const char* flag;
+};
+/// Throws Error if such a file is an input or a result, cannot be written, or exists and may not be
+/// replaced.
+void check_extra_files(std::initializer_list<ExtraFile> files,
+                       const std::vector<std::filesystem::path>& results, const SeriesFiles& input,
+                       bool may_replace);
 
 /// Returns the subcommand that the leading words of the arguments name.
 const CLI::App* find_command(const CLI::App& program, const std::vector<std::string>& arguments);
