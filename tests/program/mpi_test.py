@@ -342,7 +342,7 @@ def refuse(words, processes, *arguments):
 
 def test_faults_are_told_once(command, series):
     results = harness.fresh_results("faults")
-    refuse(["nowhere.mrc", "No such file"], 3, *command(results, input=["nowhere.mrc", *series[1:]]))
+    refuse(["nowhere.mrc", "does not exist"], 3, *command(results, input=["nowhere.mrc", *series[1:]]))
     refuse(["--no-such-option"], 2, *command(results, "--no-such-option", 3))
     refuse(["--epochs"], 2, *command(results, "--epochs", -2))
     refuse(["5 processes", "at most 4"], 5, *command(results))
@@ -358,7 +358,7 @@ def test_faults_are_told_once(command, series):
 def test_a_fault_of_one_process_is_told_by_the_first(command, series):
     results = harness.fresh_results("fault_of_one")
     other = command(results, input=["not_here.mrc", *series[1:]])
-    refuse(["not_here.mrc", "No such file"], 2, *command(results), ":", "-np", 1,
+    refuse(["not_here.mrc", "does not exist"], 2, *command(results), ":", "-np", 1,
            harness.PROGRAM, *other)
     assert not os.listdir(os.path.dirname(results.volume_path))
 
