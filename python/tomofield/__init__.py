@@ -6,13 +6,14 @@ have the same bits as those of the command line, for any number of threads. Mess
 logger "tomofield".
 """
 
-from typing import Optional
+from dataclasses import dataclass
+from typing import List, Optional
 
 import numpy.typing as npt
 
 from . import _core
-from ._checks import whole_number_of
-from ._core import Error, Progress, ShellCorrelation, VolumeScores, __version__
+from ._checks import array_of, count_of, number_of
+from ._core import Error, Progress, VolumeScores, __version__
 from ._projects import Project, Setting, open_project
 from ._records import Record, read_metrics, read_record
 from ._runs import Reconstruction, align, baseline, denoise, reconstruct
@@ -26,9 +27,26 @@ __all__ = ["Box", "Error", "Model", "Options", "Progress", "Project", "Reconstru
            "write_mrc"]
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class ShellCorrelation:
+    """Fourier shell correlation, by shell."""
+
+    frequency_per_A: List[float]
+    correlation: List[float]
+    voxels: List[int]
+    _core: _core.ShellCorrelation
+
+    def resolution_A(self, threshold: float = 0.143) -> Optional[float]:
+        """Return where the correlation first falls below a threshold, in Å, or None."""
+        level = number_of(threshold, "the threshold")
+        if not -1 <= level <= 1:
+            raise Error(f"the threshold is a correlation from -1 to 1, not {level}")
+        return self._core.resolution_A(level)
+
+
 def score_volume(volume: npt.ArrayLike, truth: npt.ArrayLike) -> VolumeScores:
     """Score a volume against the truth: PSNR and SSIM, raw and after the best scale and offset."""
-    return _core.score_volume(volume, truth)
+    return _core.score_volume(array_of(volume), array_of(truth))
 
 
 def correlate_shells(first: npt.ArrayLike, second: npt.ArrayLike,
@@ -37,13 +55,15 @@ def correlate_shells(first: npt.ArrayLike, second: npt.ArrayLike,
 
     voxel_size_A: side of a voxel in Å, which arrays need and a Tomogram has.
     """
-    return _core.correlate_shells(first, second, _voxel_size(voxel_size_A, first, second))
+    size = _voxel_size(voxel_size_A, first, second)
+    curve = _core.correlate_shells(array_of(first), array_of(second), size)
+    return ShellCorrelation(curve.frequency_per_A, curve.correlation, curve.voxels, curve)
 
 
 def set_thread_count(count: int) -> None:
     """Compute with this many threads. 0, the default: OMP_NUM_THREADS, or else the processors that
     this process may use."""
-    _core.set_thread_count(whole_number_of(count, "the number of threads"))
+    _core.set_thread_count(count_of(count, "the number of threads"))
 
 
 for _name in __all__:  # messages and help call them by the names that users know

@@ -1,44 +1,113 @@
 """What functions take from users: sentences for values of another type."""
 
+import functools
+import itertools
 import os
-from typing import Any, Dict, Literal, Mapping, Sequence, Union, get_args, get_origin, get_type_hints
+import sys
+from typing import (Any, Callable, Dict, Iterator, List, Literal, Mapping, Sequence, Tuple, Union,
+                    get_args, get_origin, get_type_hints)
 
 import numpy as np
 
 from . import _core
+from ._core import Error
 from .options import Options
 
 Path = Union[str, "os.PathLike[str]"]
+
+LONGEST_SHOWN = 100  # characters of a value in a sentence
+NUMPY_DEPTH = 32  # of the sequences that numpy makes one array of
+LIMITS = ((-sys.float_info.max, sys.float_info.max), (0, 2**64 - 1), (-2**63, 2**63 - 1),
+          (-2**31, 2**31 - 1))  # of the numbers of C++
+
+
+def shown(value: object) -> str:
+    """Return a value as a sentence shows it: on one line, which may be cut."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # Python does not write so many digits
+        return "a number of thousands of digits"
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
 def path_of(value: object, what: str) -> str:
     """Return a path as a text. `what` says in a refusal what it names: "the model"."""
     try:
-        return os.fsdecode(value)  # type: ignore[arg-type]
+        path = os.fsdecode(value)  # type: ignore[arg-type]
     except TypeError:
-        raise TypeError(f"{what} is a path, a str or a pathlib.Path, not {value!r}") from None
+        raise TypeError(f"{what} is a path, a str or a pathlib.Path, not {shown(value)}") from None
+    if "\0" in path:
+        raise Error(f"{what} cannot be {shown(path)}: no path holds a null character")
+    return path
 
 
 def number_of(value: object, what: str) -> float:
     """Return a real number."""
-    if (isinstance(value, (bool, np.bool_))
-            or not isinstance(value, (int, float, np.integer, np.floating))):
-        raise TypeError(f"{what} is a number, not {value!r}")
-    return float(value)
+    number = _scalar(value)
+    if not _is_number(number, (int, float, np.integer, np.floating)):
+        raise TypeError(f"{what} is a number, not {shown(value)}")
+    try:
+        return float(number)
+    except OverflowError:
+        raise Error(f"{what} is a number up to {sys.float_info.max}, not {shown(number)}") from None
 
 
 def whole_number_of(value: object, what: str) -> int:
     """Return a whole number."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
-        raise TypeError(f"{what} is a whole number, not {value!r}")
-    return int(value)
+    number = _scalar(value)
+    if not _is_number(number, (int, np.integer)):
+        raise TypeError(f"{what} is a whole number, not {shown(value)}")
+    return int(number)
+
+
+def count_of(value: object, what: str) -> int:
+    """Return a whole number that C++ can count."""
+    number = whole_number_of(value, what)
+    if not -2**63 <= number < 2**63:
+        raise Error(f"{what} is a whole number up to {2**63 - 1}, not {shown(number)}")
+    return number
+
+
+def numbers_of(values: Any, count: int, one_of: Callable[[object, str], float], what: str) -> Any:
+    """Return a tuple of so many numbers, each as one_of() returns it."""
+    parts = values if isinstance(values, (tuple, list)) else _array(values).ravel().tolist()
+    if len(parts) != count:
+        raise TypeError(f"{what} is {count} numbers, not {shown(values)}")
+    return tuple(one_of(part, what) for part in parts)
+
+
+def switch_of(value: object, what: str) -> bool:
+    """Return True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{what} is True or False, not {shown(value)}")
+    return bool(value)
 
 
 def text_of(value: object, what: str) -> str:
     """Return a text."""
     if not isinstance(value, str):
-        raise TypeError(f"{what} is a text, not {value!r}")
+        raise TypeError(f"{what} is a text, not {shown(value)}")
     return value
+
+
+def array_of(value: Any) -> Any:
+    """Return what numpy makes an array of, for the compiled part, which refuses masks: numpy would
+    drop those of an object's array and of the parts of a sequence."""
+    if is_masked(value):
+        return np.ma.masked
+    return _array(value) if hasattr(value, "__array__") else value
+
+
+def places_of(value: Any, what: str) -> Any:
+    """Return an array of angles or positions, which are numbers alone."""
+    if any(leaf.dtype.kind == "b" for leaf in _leaves(value)):
+        raise Error(f"{what} are numbers, not True or False")
+    return array_of(value)
+
+
+def is_masked(value: Any) -> bool:
+    """Return True if an element of an array, or of arrays in sequences, is masked."""
+    return any(np.ma.is_masked(leaf) for leaf in _leaves(value))  # type: ignore[no-untyped-call]
 
 
 def chosen(choices: _core.Choices, given: Mapping[str, object]) -> _core.Choices:
@@ -46,10 +115,17 @@ def chosen(choices: _core.Choices, given: Mapping[str, object]) -> _core.Choices
     for name, value in given.items():
         if name not in Options.__annotations__:
             raise TypeError(no_option(name))
+        if isinstance(value, np.bool_):
+            value = bool(value)
         try:
+            if _would_be_misread(name, value):
+                raise TypeError
             setattr(choices, name, value)
         except TypeError:
-            raise TypeError(f"the option {name} cannot be {value!r}: give {_kind_of(name)}"
+            if beyond := _beyond(name, value):
+                raise Error(f"the option {name} takes numbers {beyond}, not {shown(value)}"
+                            ) from None
+            raise TypeError(f"the option {name} cannot be {shown(value)}: give {_kind_of(name)}"
                             ) from None
     return choices
 
@@ -64,6 +140,72 @@ def suggestion(nearest: Sequence[str]) -> str:
     return f" (did you mean {' or '.join(nearest)}?)" if nearest else ""
 
 
+def _scalar(value: Any) -> Any:
+    """Return the number of an array without axes, and any other value as it is."""
+    return value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
+
+
+def _is_number(value: object, types: Tuple[type, ...]) -> bool:
+    return isinstance(value, types) and not isinstance(value, (bool, np.timedelta64))
+
+
+def _array(value: object) -> Any:
+    """Return an array with its mask, if it has one; one without numbers for what is no array, which
+    the compiled part refuses."""
+    try:
+        return np.asanyarray(value)
+    except Exception:  # of any object's own method
+        return np.empty(0, object)
+
+
+def _leaves(value: object) -> Iterator[Any]:
+    """Yield the arrays that a value consists of, as deep as numpy reads sequences. Python's int and
+    float are left out: there may be many, and they are what they seem."""
+    level: List[Any] = [value]
+    for _ in range(NUMPY_DEPTH + 1):
+        types = set(map(type, level))
+        if types <= {int, float}:
+            return
+        if not types <= {list, tuple}:
+            yield from (_array(part) for part in level if not _is_sequence(part))
+            level = [part for part in level if _is_sequence(part)]
+        level = list(itertools.chain.from_iterable(level))
+
+
+def _is_sequence(value: object) -> bool:
+    return (isinstance(value, Sequence) and not hasattr(value, "__array__")
+            and not isinstance(value, (str, bytes, bytearray, memoryview)))
+
+
+def _would_be_misread(name: str, value: object) -> bool:
+    """Return True if pybind11 would take True for 1, drop imaginary parts, or count days."""
+    if isinstance(value, bool):
+        return "True or False" not in _kind_of(name)
+    return any(leaf.dtype.kind in "bcmM" for leaf in _leaves(value))
+
+
+def _beyond(name: str, value: Any) -> str:
+    """Return in words which limit of its type a whole number exceeds, or nothing."""
+    numbers = value if isinstance(value, (tuple, list)) else [value]
+    are_whole = all(_is_number(number, (int, np.integer)) for number in numbers)
+    if "number" not in _kind_of(name) or not are_whole:
+        return ""
+    for low, high in LIMITS:
+        if all(_takes(name, len(numbers) * [end] if numbers is value else end)
+               for end in (low, high)):
+            return f"up to {high}" if max(numbers) > high else f"from {low} on"
+    return ""
+
+
+def _takes(name: str, value: Any) -> bool:
+    try:
+        setattr(_core.Choices(), name, value)
+    except TypeError:
+        return False
+    return True
+
+
+@functools.lru_cache(maxsize=None)
 def _kind_of(name: str) -> str:
     """Return in words what an option takes."""
     return _words_for(get_type_hints(Options, {"os": os})[name])

@@ -5,6 +5,7 @@ import sys
 import warnings
 from typing import Any, Callable, Iterator, Optional, Union
 
+from ._checks import shown
 from ._core import Progress
 
 Callback = Callable[[Progress], Optional[bool]]
@@ -20,7 +21,7 @@ def watched(progress: Union[Callback, bool, None]) -> Iterator[Optional[Callback
     """
     if progress is not None and not isinstance(progress, bool):
         if not callable(progress):
-            raise TypeError(f"progress is a function, True, False or None, not {progress!r}")
+            raise TypeError(f"progress is a function, True, False or None, not {shown(progress)}")
         yield progress
         return
     tqdm = _tqdm() if progress or (progress is None and in_notebook()) else None

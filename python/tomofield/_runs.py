@@ -1,15 +1,16 @@
 """Reconstructions, and what they are made from."""
 
+import contextlib
 import html
 import os
 from dataclasses import dataclass, field
-from typing import Any, Dict, List, Literal, Mapping, Optional, Tuple, Union, Unpack
+from typing import Any, Dict, Iterator, List, Literal, Mapping, Optional, Tuple, Union, Unpack
 
-import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._checks import Path, chosen, number_of, suggestion, text_of, whole_number_of
+from ._checks import (Path, array_of, chosen, number_of, places_of, shown, suggestion,
+                      switch_of, text_of, whole_number_of)
 from ._core import Error
 from ._progress import Callback, watched
 from ._projects import Project, Setting, open_project
@@ -21,6 +22,8 @@ Source = Union[Path, Project, npt.ArrayLike]
 Watch = Union[Callback, bool, None]
 Method = Literal["wbp", "sirt", "sart-tv", "tv", "ingp", "fourier-net"]
 MethodOption = Union[str, float, bool]
+
+_going_on: List[int] = []  # of each run the process, which may be one that this one was forked from
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,7 +146,7 @@ def baseline(source: Source, method: Method = "wbp", tilt_deg: Optional[npt.Arra
                         f"{'it' if len(unused) == 1 else 'them'} out")
     own = _own_options(method, {} if method_options is None else method_options)
     choices, core = _inputs(source, tilt_deg, series, options)
-    with watched(progress) as callback:
+    with _running(progress) as callback:
         made = _core.baseline(core, methods[method], choices, own, callback)
     if not made["is_finished"]:
         return Reconstruction(False, None, None, Record())
@@ -161,7 +164,7 @@ def align(source: Source, tilt_deg: Optional[npt.ArrayLike] = None, *, series: s
     """
     options.setdefault("align", "refine")
     choices, core = _inputs(source, tilt_deg, series, options)
-    with watched(progress) as callback:
+    with _running(progress) as callback:
         return _core.align(core, choices, callback)
 
 
@@ -169,7 +172,7 @@ def _own_options(method: str, given: Mapping[str, MethodOption]) -> Dict[str, st
     """Return the options of a method as the command line takes them, without dashes before them."""
     if not isinstance(given, Mapping):
         raise TypeError("method_options are names with values, as {'iterations': 80}, not "
-                        f"{given!r}")
+                        f"{shown(given)}")
     kinds = _core.method_options(method)
     own: Dict[str, str] = {}
     for name, value in given.items():
@@ -199,13 +202,27 @@ def _text_of(value: object, name: str, kind: str, may_be_open: bool) -> str:
         return text_of(value, what)
     if isinstance(value, str) and value in ("on", "off"):
         return value
-    if not isinstance(value, (bool, np.bool_)):
-        raise TypeError(f"{what} is {kind}, not {value!r}")
-    return "on" if value else "off"
+    return "on" if switch_of(value, what) else "off"
+
+
+@contextlib.contextmanager
+def _running(progress: Watch) -> Iterator[Optional[Callback]]:
+    """Give the callback of a run while it goes on. A process that was forked meanwhile has its
+    locks, but not the threads that would open them."""
+    process = os.getpid()
+    if any(other != process for other in _going_on):
+        raise Error("this process was forked while its parent was reconstructing, and cannot do so "
+                    "itself: fork it before, or start it with multiprocessing.get_context('spawn')")
+    _going_on.append(process)
+    try:
+        with watched(progress) as callback:
+            yield callback
+    finally:
+        _going_on.remove(process)
 
 
 def _run(choices: _core.Choices, core: _core.TiltSeries, progress: Watch) -> Reconstruction:
-    with watched(progress) as callback:
+    with _running(progress) as callback:
         made = _core.reconstruct(core, choices, callback)
     if not made["is_finished"]:
         return Reconstruction(False, None, None, Record())
@@ -218,9 +235,10 @@ def _inputs(source: Any, tilt_deg: Optional[npt.ArrayLike], series: str,
             given: Mapping[str, object]) -> Tuple[_core.Choices, _core.TiltSeries]:
     if source is None or isinstance(source, (bool, int, float, complex, Mapping)):
         raise TypeError("a series is the path of a stack or of a project, a tomofield.Project, or an "
-                        f"array [view, y, x], not {source!r}")
-    if isinstance(source, (str, os.PathLike)):
-        source = open_project(source, series=series, ignore=str(given.get("ignore", "")))
+                        f"array [view, y, x], not {shown(source)}")
+    if isinstance(source, (str, bytes, os.PathLike)):
+        source = open_project(os.fsdecode(source), series=series,
+                              ignore=str(given.get("ignore", "")))
     elif series:
         raise Error("series names one of the series of a project's path: open_project() takes it "
                     "as well")
@@ -237,4 +255,5 @@ def _inputs(source: Any, tilt_deg: Optional[npt.ArrayLike], series: str,
         raise Error("views in memory need tilt_deg, an angle a view")
     if given.get("pixel_size_A") is None:
         raise Error("views in memory need pixel_size_A, the size of a pixel in Å")
-    return chosen(_core.Choices(), given), _core.TiltSeries.from_images(source, tilt_deg)
+    return (chosen(_core.Choices(), given),
+            _core.TiltSeries.from_images(array_of(source), places_of(tilt_deg, "tilt angles")))

@@ -7,13 +7,16 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core, _pictures
-from ._checks import Path, chosen, number_of, path_of, text_of, whole_number_of
+from ._checks import (Path, array_of, chosen, count_of, is_masked, number_of, numbers_of, path_of,
+                      places_of, shown, switch_of, text_of, whole_number_of)
 from ._core import Error
 
 Array = npt.NDArray[np.float32]
 Numbers = Tuple[float, float, float]
 Axis = Literal["x", "y", "z"]
 Level = Union[Literal["found"], Tuple[float, float]]
+
+VOXEL_SIZES_A = (1e-3, 1e7)  # that a file may state, as in src/base/plausible.h
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,16 +31,16 @@ class Tomogram:
     voxel_size_A: float
 
     def __post_init__(self) -> None:
-        if np.any(getattr(self.values, "mask", False)):
+        if is_masked(self.values):
             raise Error("a tomogram has no masked voxels: fill them (numpy.ma.filled)")
         if np.ndim(self.values) != 3:
             raise Error(f"a tomogram has values [z, y, x], and these have {np.ndim(self.values)} "
                         "dimensions")
-        if not 0 <= self.voxel_size_A < np.inf:
-            raise Error(f"a voxel cannot have a side of {self.voxel_size_A} Å")
+        size = number_of(self.voxel_size_A, "voxel_size_A")
+        object.__setattr__(self, "voxel_size_A", size if size == 0 else _plausible(size))
 
     def __array__(self, dtype: Optional[npt.DTypeLike] = None) -> npt.NDArray[Any]:
-        return np.asarray(self.values, dtype=dtype)
+        return np.asanyarray(self.values, dtype=dtype)  # with the mask that somebody may give it
 
     def __getitem__(self, key: Any) -> Any:
         return self.values[key]
@@ -57,7 +60,7 @@ class Tomogram:
         """Return a section across an axis, by default the one in the middle: [y, x], [z, x] across
         y, [z, y] across x."""
         along = _axis_number(axis)
-        at = self.shape[along] // 2 if index is None else index
+        at = self.shape[along] // 2 if index is None else whole_number_of(index, "index")
         return np.asarray(np.take(self.values, at, axis=along), np.float32)
 
     def write(self, path: Path, *, overwrite: bool = False) -> None:
@@ -125,7 +128,7 @@ class Model:
 
     def sample_points(self, points: npt.ArrayLike) -> Array:
         """Return the value at each of N points, given as N rows of x, y, z in pixels."""
-        return self._core.sample_points(points)
+        return self._core.sample_points(places_of(points, "points"))
 
     def tomogram(self, voxel_size_A: Optional[float] = None) -> Tomogram:
         """Return the region of interest as a volume, by default with a voxel a pixel."""
@@ -188,14 +191,14 @@ def export(model: Union[Model, Path], output: Path, *, box: Union[Box, int, None
     angles = _angles(model, level)
     voxel_px = model._voxel_px(voxel_size_A)
     if particles is not None:
-        side = whole_number_of(box, "box, the side of the cubes of particles in voxels,")
+        side = count_of(box, "box, the side of the cubes of particles in voxels,")
         _core.export_particles(model._core, path_of(particles, "the list of particles"), side,
                                voxel_px, text_of(tomogram, "tomogram"), angles, file, choices)
         return
     if tomogram:
         raise Error("tomogram names the particles that are taken: give their list with particles")
     if box is not None and not isinstance(box, Box):
-        raise TypeError(f"box is a tomofield.Box, not {box!r}; a side alone is for particles")
+        raise TypeError(f"box is a tomofield.Box, not {shown(box)}; a side alone is for particles")
     if box is not None and voxel_size_A is not None:
         raise Error("box states the size of its voxels (voxel_px): leave voxel_size_A out")
     _core.export_box(model._core, None if box is None else _core_box(box), voxel_px, angles, file,
@@ -214,18 +217,28 @@ def write_mrc(path: Path, volume: npt.ArrayLike, voxel_size_A: Optional[float] =
 
     voxel_size_A: side of a voxel in Å, which an array needs and a Tomogram has.
     """
-    _core.write_mrc(volume, _voxel_size(voxel_size_A, volume), path_of(path, "the output"),
-                    bool(overwrite))
+    size, file = _voxel_size(voxel_size_A, volume), path_of(path, "the output")
+    with np.errstate(over="raise"):  # numbers that are too large for 32 bits are refused
+        _core.write_mrc(array_of(volume), size, file, switch_of(overwrite, "overwrite"))
 
 
 def _voxel_size(given: Optional[float], *volumes: Any) -> float:
     """Return the size of a voxel: the one that is given, or that of the first Tomogram."""
     if given is not None:
-        return number_of(given, "voxel_size_A")
+        return _plausible(number_of(given, "voxel_size_A"))
     for volume in volumes:
         if isinstance(volume, Tomogram):
-            return volume.voxel_size_A
+            return _plausible(volume.voxel_size_A)
     raise Error("an array does not say how large its voxels are: give voxel_size_A, in Å")
+
+
+def _plausible(size_A: float) -> float:
+    """Return the size of a voxel if it can be one."""
+    low, high = VOXEL_SIZES_A
+    if not low <= size_A <= high:
+        raise Error(f"a voxel cannot have a side of {size_A} Å: give voxel_size_A, from {low} to "
+                    f"{high:.0f} Å")
+    return size_A
 
 
 def _angles(model: Model, level: Optional[Level]) -> Optional[Tuple[float, float]]:
@@ -235,13 +248,10 @@ def _angles(model: Model, level: Optional[Level]) -> Optional[Tuple[float, float
     if isinstance(level, str) and level == "found":
         return _core.found_levelling(model._core)
     try:
-        if not isinstance(level, (tuple, list, np.ndarray)):
-            raise TypeError
-        pitch, x_tilt = (number_of(angle, "an angle") for angle in level)
-        return pitch, x_tilt
-    except (TypeError, ValueError):
-        raise TypeError(f"level is 'found' or two angles in degrees, (pitch, x_tilt), not {level!r}"
-                        ) from None
+        return numbers_of(level, 2, number_of, "level")  # type: ignore[no-any-return]
+    except TypeError:
+        raise TypeError("level is 'found' or two angles in degrees, (pitch, x_tilt), not "
+                        f"{shown(level)}") from None
 
 
 def _axis_number(axis: str) -> int:
@@ -257,9 +267,12 @@ def _box_of(core: _core.SampleBox) -> Box:
 
 def _core_box(box: Box) -> _core.SampleBox:
     if not isinstance(box, Box):
-        raise TypeError(f"a box is a tomofield.Box, not {box!r}")
+        raise TypeError(f"a box is a tomofield.Box, not {shown(box)}")
     try:
-        return _core.SampleBox(box.centre_px, box.size, box.voxel_px, box.euler_deg)
-    except TypeError:
+        return _core.SampleBox(numbers_of(box.centre_px, 3, number_of, "centre_px"),
+                               numbers_of(box.size, 3, count_of, "size"),
+                               number_of(box.voxel_px, "voxel_px"),
+                               numbers_of(box.euler_deg, 3, number_of, "euler_deg"))
+    except TypeError as error:
         raise TypeError("a box has three numbers in centre_px and in euler_deg, three whole numbers "
-                        f"in size, and a number in voxel_px: not {box!r}") from None
+                        f"in size, and a number in voxel_px: {error}") from None

@@ -1,7 +1,9 @@
 """What functions say of arguments of a wrong type: a sentence with what to give, and none of
 pybind11's or numpy's own."""
 
+import collections
 import pathlib
+import re
 
 import numpy as np
 import pytest
@@ -63,10 +65,42 @@ CALLS = {
     "not (True, False)": lambda m, s: tomofield.export(m, "x.mrc", level=(True, False)),
     "not {1: 1, 2: 2}": lambda m, s: tomofield.export(m, "x.mrc", level={1: 1, 2: 2}),
     "voxel_px is a number, not (1+2j)": lambda m, s: m.region(np.complex64(1 + 2j)),
-    "the threshold is a number, not 'x'": lambda m, s: tomofield.correlate_shells(
-        np.random.default_rng(1).random((8, 8, 8)), np.random.default_rng(2).random((8, 8, 8)),
-        1.0).resolution_A("x"),
+    "the threshold is a number, not 'x'": lambda m, s: curve().resolution_A("x"),
+    "the threshold is a number, not True": lambda m, s: curve().resolution_A(True),
+    "thickness cannot be True: give a number": lambda m, s: fit(thickness=True),
+    "thickness cannot be (8+1j): give a number": lambda m, s: fit(thickness=np.complex64(8 + 1j)),
+    "pixel_size_A cannot be False: give a number": lambda m, s: fit(pixel_size_A=np.bool_(False)),
+    "epochs cannot be True: give a whole number": lambda m, s: fit(epochs=True),
+    "epochs cannot be numpy.timedelta64(1)": lambda m, s: fit(epochs=np.timedelta64(1)),
+    "seed cannot be array(True): give a whole number": lambda m, s: fit(seed=np.array(True)),
+    "hand cannot be True: give 1 or -1": lambda m, s: fit(hand=True),
+    "roi cannot be (True, 0, 8, 8)": lambda m, s: fit(roi=(True, 0, 8, 8)),
+    "roi cannot be array([ True, True, True, True])": lambda m, s: fit(roi=np.ones(4, bool)),
+    "size is a whole number, not True": lambda m, s: box(size=(True, 2, 2)),
+    "centre_px is a number, not True": lambda m, s: box(centre_px=np.ones(3, bool)),
+    "centre_px is a number, not (1+0j)": lambda m, s: box(centre_px=np.ones(3, complex)),
+    "euler_deg is a number, not (1+0j)": lambda m, s: box(euler_deg=np.ones(3, complex)),
+    "voxel_px is a number, not True": lambda m, s: box(voxel_px=True),
+    "centre_px is 3 numbers, not '123'": lambda m, s: box(centre_px="123"),
+    "index is a whole number, not True": lambda m, s: tomofield.Tomogram(VIEWS, 1).section("z", True),
+    "voxel_size_A is a number, not '10'": lambda m, s: tomofield.Tomogram(VIEWS, "10"),
+    "overwrite is True or False, not 'no'": lambda m, s: tomofield.write_mrc(
+        "x.mrc", VIEWS, 1, overwrite="no"),
 }
+
+
+def curve():
+    first, second = np.random.default_rng(1).random((2, 8, 8, 8))
+    return tomofield.correlate_shells(first, second, 1.0)
+
+
+def fit(views=VIEWS, tilts=TILTS, **options):
+    return tomofield.reconstruct(views, tilts, **{"pixel_size_A": 1, "thickness": 4, **options})
+
+
+def box(**parts):
+    whole = {"centre_px": (9, 9, 9), "size": (2, 2, 2), **parts}
+    tomofield._volumes._core_box(tomofield.Box(**whole))
 
 
 @pytest.mark.parametrize("said", CALLS)
@@ -79,18 +113,56 @@ def test_a_wrong_type_is_answered_with_what_to_give(series, model, said):
 
 MASKED = np.ma.masked_array(np.ones((3, 8, 8)), mask=np.arange(192).reshape(3, 8, 8) == 5)
 MASKED_ELEMENTS = "an array with masked elements"
+
+
+class Holder:
+    """Gives numpy an array."""
+
+    def __init__(self, array):
+        self.array = array
+
+    def __array__(self, dtype=None):
+        return self.array
+
+
 SENTENCES = (
     ("the number of threads must be from 1 to 1024", lambda m: tomofield.set_thread_count(-1)),
     ("or 0 for the default, not 1000000", lambda m: tomofield.set_thread_count(10**6)),
     ("too little memory", lambda m: tomofield.score_volume(  # of 2 EiB, which no machine has
         *2 * [np.broadcast_to(np.float64(1), (1 << 20, 1 << 20, 1 << 19))])),
-    (MASKED_ELEMENTS, lambda m: tomofield.reconstruct(MASKED, TILTS, pixel_size_A=1, thickness=4)),
-    (MASKED_ELEMENTS, lambda m: tomofield.reconstruct(
-        VIEWS, np.ma.masked_array(TILTS, mask=[0, 0, 1]), pixel_size_A=1, thickness=4)),
+    (MASKED_ELEMENTS, lambda m: fit(MASKED)),
+    (MASKED_ELEMENTS, lambda m: fit(list(MASKED))),
+    (MASKED_ELEMENTS, lambda m: fit([VIEWS[0].tolist(), *MASKED[:2]])),
+    (MASKED_ELEMENTS, lambda m: fit([[row for row in view] for view in MASKED])),
+    (MASKED_ELEMENTS, lambda m: fit(tilts=np.ma.masked_array(TILTS, mask=[0, 0, 1]))),
+    (MASKED_ELEMENTS, lambda m: fit(tilts=[-10, np.ma.masked, 10])),
+    (MASKED_ELEMENTS, lambda m: tomofield.score_volume(VIEWS, Holder(MASKED))),
+    (MASKED_ELEMENTS, lambda m: tomofield.correlate_shells([Holder(v) for v in MASKED], VIEWS, 1.0)),
+    (MASKED_ELEMENTS, lambda m: tomofield.write_mrc("x.mrc", collections.deque(MASKED), 1.0)),
     (MASKED_ELEMENTS, lambda m: m.sample_points(np.ma.masked_array([[1, 2, 3]], mask=True))),
     (MASKED_ELEMENTS, lambda m: tomofield.score_volume(VIEWS, MASKED)),
     (MASKED_ELEMENTS, lambda m: tomofield.write_mrc("x.mrc", MASKED, 1.0)),
     ("no masked voxels", lambda m: tomofield.Tomogram(MASKED, 1.0)),
+    ("no masked voxels", lambda m: tomofield.Tomogram(list(MASKED), 1.0)),
+    ("tilt angles are numbers, not True or False", lambda m: fit(tilts=np.array(TILTS) > 0)),
+    ("tilt angles are numbers", lambda m: fit(tilts=[True, *TILTS[1:]])),
+    ("points are numbers", lambda m: m.sample_points([[1, 2, False]])),
+    ("epochs takes numbers up to 2147483647, not 2147483648", lambda m: fit(epochs=2**31)),
+    ("seed takes numbers from 0 on, not -1", lambda m: fit(seed=-1)),
+    ("seed takes numbers up to 18446744073709551615", lambda m: fit(seed=2**64)),
+    ("roi takes numbers up to 9223372036854775807", lambda m: fit(roi=(0, 0, 8, 2**63))),
+    ("thickness takes numbers up to 1.79.*, not a number of thousands", lambda m: fit(
+        thickness=10**5000)),
+    ("in voxels, is a whole number up to 9223372036854775807", lambda m: tomofield.export(
+        m, "x", particles="p.txt", box=2**63)),
+    ("size is a whole number up to", lambda m: box(size=(1, 1, 2**63))),
+    ("threads is a whole number up to", lambda m: tomofield.set_thread_count(2**70)),
+    ("voxel_size_A is a number up to 1.79", lambda m: tomofield.write_mrc("x.mrc", VIEWS, 2**2000)),
+    ("a side of 1e\\+300 Å: give voxel_size_A, from 0.001 to 10000000 Å",
+     lambda m: tomofield.Tomogram(VIEWS, 1e300)),
+    ("a side of 1e\\+300 Å", lambda m: tomofield.correlate_shells(VIEWS, VIEWS, 1e300)),
+    ("the threshold is a correlation from -1 to 1, not nan", lambda m: curve().resolution_A(np.nan)),
+    ("no path holds a null character", lambda m: tomofield.read_mrc("a\0b")),
 )
 
 
@@ -110,9 +182,26 @@ def test_numbers_and_paths_of_every_kind_are_taken(series, model):
                  pathlib.Path(series.folder / "truth.mrc")):
         assert tomofield.read_mrc(path).shape == (16, 32, 32)
     tomofield.set_thread_count(np.int64(0))
+    assert set_options(take_log=np.bool_(True), thickness=np.array(8)) == (True, 8)
+    assert curve().resolution_A(np.float32(0.5)) == curve().resolution_A(0.5)
+    with pytest.raises(tomofield.Error, match="absent.mrc"):
+        tomofield.reconstruct(b"absent.mrc", thickness=4)
     whole = np.ma.masked_array(np.random.default_rng(1).random((8, 9, 10)), mask=False)
     assert tomofield.score_volume(whole, whole).correlation == pytest.approx(1)
+    assert tomofield.score_volume(list(whole), Holder(whole)).correlation == pytest.approx(1)
     assert len(tomofield.Tomogram(whole, 1.0)) == 8
+
+
+def set_options(**options):
+    core = tomofield._projects.chosen(tomofield._core.Choices(), options)
+    return tuple(getattr(core, name) for name in options)
+
+
+def test_a_value_is_shown_on_one_line():
+    with pytest.raises(TypeError) as refused:
+        fit(thickness=VIEWS)
+    assert re.fullmatch(r"the option thickness cannot be array\(.{94}\.\.\.: give a number",
+                        str(refused.value))
 
 
 @pytest.mark.parametrize("name, like", (

@@ -80,8 +80,13 @@ def test_mrc_files_are_written_and_read(made, tmp_path):
     assert tomofield.read_mrc(path).shape == (2, 3, 4)
     with pytest.raises(tomofield.Error, match="give voxel_size_A, in Å"):
         tomofield.write_mrc(path, np.ones((2, 3, 4)), overwrite=True)
-    with pytest.raises(tomofield.Error, match="voxels of 0 Å"):
+    with pytest.raises(tomofield.Error, match="a side of 0.0 Å"):
         tomofield.write_mrc(path, np.ones((2, 3, 4)), 0, overwrite=True)
+    with pytest.raises(tomofield.Error, match="float64 has numbers that are too large"):
+        tomofield.write_mrc(path, np.full((2, 3, 4), 1e300), 2.5, overwrite=True)
+    views = np.array([[[np.nan, np.inf, 1, 2]]])  # a tilt series may have such pixels
+    tomofield.write_mrc(path, views, 2.5, overwrite=True)
+    np.testing.assert_array_equal(tomofield.read_mrc(path).values, views)
     with pytest.raises(tomofield.Error, match="absent.mrc"):
         tomofield.read_mrc("absent.mrc")
 
