@@ -3,7 +3,6 @@
 #include <optional>
 #include <string>
 
-#include "io/saving/output_files.h"
 #include "option_table/setting.h"
 #include "option_table/values.h"
 #include "projects/project.h"
@@ -25,7 +24,6 @@ Project open_project(const ProjectRequest& request) {
                               .ignored = option_table::split_names(request.ignore),
                               .series = request.series});
   if (!project) return {choices.files, choices.options, {}};
-  for (const auto& file : project->files()) io::add_input(file);
   option_table::apply_settings(project->settings(), choices);
   return {choices.files, choices.options, project->warnings()};
 }

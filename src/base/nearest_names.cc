@@ -1,5 +1,8 @@
 #include "base/nearest_names.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
@@ -80,6 +83,10 @@ std::vector<std::string> nearest_names(const std::string& unknown,
                                        const std::vector<std::string>& names) {
   const std::vector<std::string> nearest = nearest_by_letters(unknown, names);
   return nearest.empty() ? nearest_by_words(unknown, names) : nearest;
+}
+
+std::string did_you_mean(const std::vector<std::string>& nearest) {
+  return nearest.empty() ? "" : fmt::format(" (did you mean {}?)", fmt::join(nearest, " or "));
 }
 
 }  // namespace tomofield::base

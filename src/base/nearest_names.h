@@ -12,4 +12,8 @@ namespace tomofield::base {
 std::vector<std::string> nearest_names(const std::string& unknown,
                                        const std::vector<std::string>& names);
 
+/// Returns " (did you mean a or b?)", the end of a sentence on an unknown name, or an empty text
+/// without names.
+std::string did_you_mean(const std::vector<std::string>& nearest);
+
 }  // namespace tomofield::base

@@ -242,11 +242,9 @@ std::string set_value(std::string_view text, const Range& range, Target& target)
                               const std::vector<MethodOption>& known) {
   std::vector<std::string> names;
   for (const MethodOption& option : known) names.emplace_back(option.flag.substr(2));
-  const std::vector<std::string> nearest = base::nearest_names(name, names);
-  throw Error(fmt::format(
-      "the method {} has no option '{}'{}; it has {}", method, name,
-      nearest.empty() ? "" : fmt::format(" (did you mean {}?)", fmt::join(nearest, " or ")),
-      fmt::join(names, ", ")));
+  throw Error(fmt::format("the method {} has no option '{}'{}; it has {}", method, name,
+                          base::did_you_mean(base::nearest_names(name, names)),
+                          fmt::join(names, ", ")));
 }
 
 }  // namespace

@@ -196,10 +196,10 @@ void check_options(const BaselineOptions& options) {
   const output::OutputPaths paths = output::output_paths(options.shared.run.output);
   std::vector<std::filesystem::path> results{paths.volume, paths.json};
   for (const auto& picture : paths.pictures()) results.push_back(picture);
-  io::check_output_files(results, io::input_files(options.files), options.shared.run.overwrite,
-                         kAdvice);
-  if (options.shared.volume.zarr)
-    output::check_zarr(paths.volume, options.shared.run.overwrite, kAdvice);
+  const std::vector<std::filesystem::path> inputs = io::input_files(options.files);
+  const bool may_replace = options.shared.run.overwrite;
+  io::check_output_files(results, inputs, may_replace, kAdvice);
+  if (options.shared.volume.zarr) output::check_zarr(paths.volume, inputs, may_replace, kAdvice);
 }
 
 bool BaselineOptions::fits_view_scale() const {

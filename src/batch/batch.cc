@@ -37,7 +37,7 @@ void require_own_relion_table(const std::vector<Series>& all, const fs::path& fo
 
 }  // namespace
 
-void settle_outputs(std::vector<Series>& all, const PlanOptions& options, Faults& faults) {
+void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::Faults& faults) {
   std::vector<fs::path> inputs, outputs;
   for (Series& series : all) {
     faults.collect([&] { series.output = output_of(series, options.folder); });
@@ -60,7 +60,7 @@ void settle_outputs(std::vector<Series>& all, const PlanOptions& options, Faults
 }
 
 void require_room(const std::vector<Job>& jobs, const Room& room) {
-  Faults faults;
+  base::Faults faults;
   for (const Job& job : jobs) {
     const std::int64_t needed = job.needs.memory_bytes_of_one_thread;
     if (job.is_skipped || needed <= room.memory_bytes) continue;
@@ -71,7 +71,7 @@ void require_room(const std::vector<Job>& jobs, const Room& room) {
                     job.name, static_cast<double>(needed) / kGibibyte,
                     static_cast<double>(room.memory_bytes) / kGibibyte));
   }
-  faults.require_none();
+  require_none(faults);
 }
 
 void begin_batch(const fs::path& folder, const JobList& list) {

@@ -15,7 +15,7 @@ namespace tomofield::batch {
 /// anything: that no two series share a name or an output, that no output is an input, that
 /// placeholders stand for something, and, unless existing results are skipped or replaced, that
 /// there are none. Adds all mistakes to `faults`.
-void settle_outputs(std::vector<Series>& all, const PlanOptions& options, Faults& faults);
+void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::Faults& faults);
 
 /// Throws Error with every job that needs more memory than there is, also on one thread.
 void require_room(const std::vector<Job>& jobs, const Room& room);

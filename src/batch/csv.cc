@@ -107,7 +107,7 @@ std::string spreadsheet_text(std::string_view text) {
 }
 
 std::string csv_field(std::string_view text) {
-  if (text.find_first_of(",\"\r\n\t") == std::string_view::npos && io::trim(text) == text)
+  if (text.find_first_of(",;\"\r\n\t") == std::string_view::npos && io::trim(text) == text)
     return std::string(text);
   std::string quoted = "\"";
   for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <string>
+#include <system_error>
 
 #include "batch/choice.h"
 #include "batch/relion_table.h"
@@ -39,10 +40,20 @@ std::vector<fs::path> results_of(const Job& job) {
   return files;
 }
 
+void require_no_folders(const std::vector<fs::path>& files, base::Faults& faults) {
+  std::error_code absent;
+  for (const fs::path& file : files)
+    if (fs::is_directory(file, absent))
+      faults.add(fmt::format(
+          "'{}' is a folder, and the batch writes a file of this name: move it, or give another "
+          "folder with --output",
+          file.string()));
+}
+
 // Collects who writes which files, and finds those that are written twice or read.
 class Writers {
  public:
-  explicit Writers(Faults& faults) : faults_(faults) {}
+  explicit Writers(base::Faults& faults) : faults_(faults) {}
 
   void add(const std::string& writer, const std::vector<fs::path>& files) {
     for (const fs::path& file : files) {
@@ -76,19 +87,22 @@ class Writers {
     return file == named ? "" : fmt::format(", which is '{}'", file.string());
   }
 
-  Faults& faults_;
+  base::Faults& faults_;
   std::map<io::FileIdentity, Written> writers_;
 };
 
 }  // namespace
 
 void check_files(const fs::path& folder, const fs::path& list, const std::vector<Job>& jobs,
-                 Faults& faults) {
+                 base::Faults& faults) {
   Writers writers(faults);
   const auto name_of = [](const Job& job) { return fmt::format("the series '{}'", job.name); };
-  writers.add("the batch itself", files_of_batch(folder, jobs));
+  const std::vector<fs::path> own = files_of_batch(folder, jobs);
+  require_no_folders(own, faults);
+  writers.add("the batch itself", own);
   for (const Job& job : jobs) writers.add(name_of(job), results_of(job));
   writers.require_none_reads("the list of the series", {list});
+  writers.require_none_reads("the command line", io::added_inputs());
   for (const Job& job : jobs) writers.require_none_reads(name_of(job), job.files.inputs);
 }
 

@@ -14,6 +14,6 @@ namespace tomofield::batch {
 /// names are spelled. The plans of the jobs name their files; those of a job that is skipped are
 /// the usual ones.
 void check_files(const std::filesystem::path& folder, const std::filesystem::path& list,
-                 const std::vector<Job>& jobs, Faults& faults);
+                 const std::vector<Job>& jobs, base::Faults& faults);
 
 }  // namespace tomofield::batch

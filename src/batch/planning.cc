@@ -47,7 +47,7 @@ void add_plan(const record::PlanRecord& plan, Job& job) {
 // beside it, which would reconstruct it twice. Series with options of their own may share a stack.
 class Stacks {
  public:
-  void require_new(const std::string& stack, const Series& series, Faults& faults) {
+  void require_new(const std::string& stack, const Series& series, base::Faults& faults) {
     if (stack.empty() || !series.options.empty()) return;
     const auto [first, is_new] = sources_.emplace(stack, series.source);
     if (is_new) return;
@@ -82,7 +82,7 @@ std::vector<std::string> command_of(const Series& series, const std::vector<Give
 }
 
 void check_placeholders(const std::vector<Series>& all, const std::vector<GivenOption>& common,
-                        Faults& faults) {
+                        base::Faults& faults) {
   for (const GivenOption& option : common)
     faults.collect([&] { option_for({}, option, option.flag); });
   for (const Series& series : all)
@@ -92,8 +92,8 @@ void check_placeholders(const std::vector<Series>& all, const std::vector<GivenO
 
 JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
   const io::ScratchFolder scratch(options.folder, ".tomofield-plan");
-  const fs::path plan = scratch.path() / "plan.json", log = scratch.path() / "log";
-  Faults faults;
+  const fs::path plan = scratch.plan(), log = scratch.log();
+  base::Faults faults;
   Stacks stacks;
   JobList list{.jobs = {}, .overwrites = options.overwrites};
   for (const Series& series : all) {
@@ -124,7 +124,7 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
     list.jobs.push_back(std::move(job));
   }
   check_files(options.folder, options.list, list.jobs, faults);
-  faults.require_none();
+  require_none(faults);
   return list;
 }
 

@@ -35,7 +35,7 @@ std::vector<std::string> command_of(const Series& series,
 
 /// Adds every placeholder that stands for nothing in the options of all series and of each.
 void check_placeholders(const std::vector<Series>& all,
-                        const std::vector<option_table::GivenOption>& common, Faults& faults);
+                        const std::vector<option_table::GivenOption>& common, base::Faults& faults);
 
 /// Makes a job of every series, and runs each with --plan to check it and to find what it needs.
 /// Series that are skipped must have readable results, and are not checked otherwise. The outputs

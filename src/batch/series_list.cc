@@ -52,10 +52,10 @@ std::string fault_of_unknown(const std::string& name, const KnownColumns& known)
         name, usual);
   std::vector<std::string> names{"stack", "path", "name", "output"};
   names.insert(names.end(), known.names.begin(), known.names.end());
-  const std::vector<std::string> nearest = base::nearest_names(usual, names);
-  return fmt::format(
-      "'{}' is no option of `tomofield reconstruct`{}, which --help-all lists", name,
-      nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", fmt::join(nearest, "' or '")));
+  std::vector<std::string> nearest = base::nearest_names(usual, names);
+  for (std::string& column : nearest) column = fmt::format("'{}'", column);
+  return fmt::format("'{}' is no option of `tomofield reconstruct`{}, which --help-all lists", name,
+                     base::did_you_mean(nearest));
 }
 
 std::string fault_of(const Column& column, const KnownColumns& known) {
@@ -85,7 +85,7 @@ void require_separator(const fs::path& path, const CsvRecord& head) {
 
 // Throws Error, also with what is wrong beside it, unless one column has the series.
 void require_input(const fs::path& path, const CsvRecord& head, const std::vector<Column>& columns,
-                   Faults& faults) {
+                   base::Faults& faults) {
   if (std::ranges::count_if(columns, &Column::is_input) == 1) return;
   const bool is_misspelt = std::ranges::any_of(columns, [](const Column& column) {
     return column.kind == ColumnKind::kUnknown &&
@@ -95,12 +95,12 @@ void require_input(const fs::path& path, const CsvRecord& head, const std::vecto
     faults.add(
         fmt::format("{}: one column must be named 'stack' (or 'path'), for the files of the series",
                     place(path, head.line)));
-  faults.require_none();
+  require_none(faults);
 }
 
 // Returns the columns that the first record names.
 std::vector<Column> read_head(const fs::path& path, const CsvRecord& head,
-                              const KnownColumns& known, Faults& faults) {
+                              const KnownColumns& known, base::Faults& faults) {
   require_separator(path, head);
   std::vector<Column> columns;
   const auto fail = [&](const std::string& what) {
@@ -150,7 +150,7 @@ std::string add_option(const Column& column, const std::string& cell, Series& se
 
 // Reads one series and adds its mistakes to `faults`.
 Series read_row(const fs::path& path, const CsvRecord& record, const std::vector<Column>& columns,
-                Faults& faults) {
+                base::Faults& faults) {
   Series series{
       .name = {}, .source = place(path, record.line), .input = {}, .output = {}, .options = {}};
   const auto fail = [&](const std::string& what) { faults.add(series.source + ": " + what); };
@@ -203,7 +203,8 @@ std::string series_name(const fs::path& input) {
   return fs::is_directory(path, absent) ? path.filename().string() : path.stem().string();
 }
 
-std::vector<Series> read_table(const fs::path& path, const KnownColumns& known, Faults& faults) {
+std::vector<Series> read_table(const fs::path& path, const KnownColumns& known,
+                               base::Faults& faults) {
   std::vector<CsvRecord> records;
   try {
     records = parse_csv(io::read_text_file(path), path.extension() == ".tsv" ? '\t' : ',');
@@ -257,7 +258,7 @@ std::vector<Series> read_star(const fs::path& path) {
   return all;
 }
 
-void check_names(const std::vector<Series>& all, Faults& faults) {
+void check_names(const std::vector<Series>& all, base::Faults& faults) {
   std::map<std::string, const Series*> names;
   std::map<fs::path, const Series*> outputs;
   for (const Series& series : all) {
@@ -281,12 +282,13 @@ void check_names(const std::vector<Series>& all, Faults& faults) {
   }
 }
 
-void Faults::require_none() const {
-  if (sentences_.empty()) return;
-  if (sentences_.size() == 1) throw Error(sentences_.front());
-  for (const std::string& sentence : sentences_) base::log_info(sentence);
+void require_none(const base::Faults& mistakes) {
+  const std::vector<std::string>& sentences = mistakes.sentences();
+  if (sentences.empty()) return;
+  if (sentences.size() == 1) throw Error(sentences.front());
+  for (const std::string& sentence : sentences) base::log_info(sentence);
   throw Error(fmt::format("these {} mistakes are to be mended first; nothing was started",
-                          sentences_.size()));
+                          sentences.size()));
 }
 
 }  // namespace tomofield::batch

@@ -5,30 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "base/check.h"
 #include "option_table/setting.h"
-#include "tomofield/error.h"
 
 namespace tomofield::batch {
 
-/// Collects the mistakes of all series of a batch, so that a user sees them at once.
-class Faults {
- public:
-  void add(std::string sentence) { sentences_.push_back(std::move(sentence)); }
-  /// Adds the mistake that `check` throws as Error, if it throws one.
-  template <typename Check>
-  void collect(const Check& check) {
-    try {
-      check();
-    } catch (const Error& error) {
-      add(error.what());
-    }
-  }
-  /// Throws Error if there is a mistake. Of several, logs each on a line of its own before.
-  void require_none() const;
-
- private:
-  std::vector<std::string> sentences_;
-};
+/// Throws Error if there is a mistake. Of several, logs each on a line of its own before.
+void require_none(const base::Faults& mistakes);
 
 /// One series of a batch, as a table or a pattern names it.
 struct Series {
@@ -61,7 +44,7 @@ struct KnownColumns {
 /// filled in (placeholders.h). Adds every mistake with its line to `faults`, and leaves out the
 /// series that have no stack. Throws Error if it cannot tell which columns there are.
 std::vector<Series> read_table(const std::filesystem::path& path, const KnownColumns& known,
-                               Faults& faults);
+                               base::Faults& faults);
 
 /// Returns the files and folders that a pattern of the shell names, in their order. A file gives
 /// its series the name of the file without its ending. Those with the same name get that of their
@@ -79,6 +62,6 @@ std::string series_name(const std::filesystem::path& input);
 
 /// Adds every series whose name cannot be that of a file, and every name and output that two series
 /// share. The outputs are there.
-void check_names(const std::vector<Series>& all, Faults& faults);
+void check_names(const std::vector<Series>& all, base::Faults& faults);
 
 }  // namespace tomofield::batch

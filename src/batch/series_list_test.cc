@@ -34,10 +34,10 @@ class SeriesList : public ::testing::Test {
 
   std::string path(const std::string& name) const { return (directory_ / name).string(); }
   std::vector<Series> read(const std::string& text, const std::string& name = "list.csv") {
-    Faults faults;
+    base::Faults faults;
     auto all = read_table(directory_.write(name, text),
                           {kind_of, {"thickness", "center", "invert", "tlt"}}, faults);
-    faults.require_none();
+    require_none(faults);
     return all;
   }
   // Returns all that is said of a table that is refused.
@@ -147,9 +147,9 @@ TEST_F(SeriesList, NamesAndOutputsMustDiffer) {
     return Series{.name = name, .source = "x", .input = {}, .output = output, .options = {}};
   };
   const auto check = [](const std::vector<Series>& all) {
-    Faults faults;
+    base::Faults faults;
     check_names(all, faults);
-    faults.require_none();
+    require_none(faults);
   };
   EXPECT_NO_THROW(check({series("a", "a.mrc"), series("b", "b.mrc")}));
   EXPECT_THROW(check({series("a", "a.mrc"), series("a", "b.mrc")}), Error);

@@ -180,7 +180,7 @@ distributed::GatheredArrays own_parts(const fit::Fit& fit) {
 void save(const std::filesystem::path& path, const fit::Fit& fit, const output::ModelInfo& info,
           const output::TrainingState& state,
           const std::map<std::string, std::span<const float>>& moments) {
-  fit.processes().run_collectively([&] { output::require_finite(fit.field(), path); });
+  fit.processes().run_collectively([&] { output::require_converged(fit.field()); });
   distributed::GatheredArrays arrays = own_parts(fit);
   const auto source = [&](std::span<const float> values) {
     const std::size_t array = arrays.add(values);

@@ -49,6 +49,7 @@ void FinishedTiles::read() {
     throw Error(fmt::format("'{}' was made with --budget {}: give the same", path, text("budget")));
   try {
     tiles_ = tiles_from(text("tiles"), series_.roi.height());
+    compact::require_sound(model.coded->codes);
   } catch (const std::exception& error) {
     throw Error(fmt::format("'{}' is damaged: {}", path, error.what()));
   }

@@ -2,7 +2,6 @@
 #include "base/system/child_process.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -70,8 +69,7 @@ std::string suggestion(const CLI::App& program, const std::string& word) {
   std::vector<std::string> names;
   for (const CLI::App* command : program.get_subcommands(nullptr))
     names.push_back(command->get_name());
-  const std::vector<std::string> nearest = base::nearest_names(word, names);
-  return nearest.empty() ? "" : fmt::format(" (did you mean {}?)", fmt::join(nearest, " or "));
+  return base::did_you_mean(base::nearest_names(word, names));
 }
 
 // Refuses a misspelt command. CLI11 would say that a command is missing.
@@ -152,6 +150,13 @@ void print_answer(const CLI::App& program, const CLI::ParseError& request) {
   print_text(answer.str());
 }
 
+// Refuses "--option=" without a value. CLI11 would take the next word for it.
+void require_values(const std::vector<std::string>& arguments) {
+  for (const std::string& word : arguments)
+    if (word.starts_with("--") && word.find('=') == word.size() - 1)
+      throw Error(fmt::format("{} has no value: give one, or leave the option out", word));
+}
+
 // Parses the command line and runs the command. Returns the exit status, or throws.
 int run_command(CLI::App& program, std::vector<std::string> arguments,
                 const distributed::Communicator& processes) {
@@ -162,6 +167,7 @@ int run_command(CLI::App& program, std::vector<std::string> arguments,
   processes.run_collectively([&] {
     require_known_command(program, arguments);
     require_shared_command(arguments, processes);
+    require_values(arguments);
     expand_config_file(program, arguments);
   });
   std::vector<std::string> last_first(arguments.rbegin(), arguments.rend());  // for CLI11

@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "base/plausible.h"
+#include "compact/leaf_code.h"
 #include "field/tree/quadtree_bands.h"
 
 namespace tomofield::compact {
@@ -36,6 +37,11 @@ std::span<const std::uint8_t> LeafCodes::code(int leaf) const {
   const auto at = static_cast<std::size_t>(leaf);
   const auto first = static_cast<std::size_t>(offset[at]);
   return std::span(bytes).subspan(first, static_cast<std::size_t>(offset[at + 1]) - first);
+}
+
+void require_sound(const LeafCodes& codes) {
+  for (std::size_t leaf = 0; leaf < codes.shapes.size(); ++leaf)
+    decode(codes.code(static_cast<int>(leaf)), codes.shapes[leaf]);
 }
 
 field::LeafShape with_upper_faces(const field::LeafShape& shape) {

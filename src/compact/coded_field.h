@@ -29,6 +29,9 @@ struct LeafCodes {
   std::span<const std::uint8_t> code(int leaf) const;
 };
 
+/// Throws Error if the code of a leaf is damaged. Decodes one leaf after the other.
+void require_sound(const LeafCodes& codes);
+
 /// Stands for a leaf where the field that was compressed has none.
 inline constexpr field::LeafShape kNoLeaf{.nx = 1, .ny = 1, .nz = 2};
 

@@ -88,9 +88,9 @@ Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
 
 // Returns the grid of the row's future volume, or nothing if it was asked to stop.
 std::optional<Grid> grid_to_be(const CompareOptions& options, const RunHooks& hooks, const Row& row,
-                               const fs::path& scratch) {
+                               const io::ScratchFolder& scratch) {
   if (is_done(row)) return read_grid(row.volume);
-  const fs::path log = scratch / "log", grid = scratch / "grid.json";
+  const fs::path log = scratch.log(), grid = scratch.plan();
   std::error_code absent;
   fs::remove(grid, absent);  // that of the row before
   auto command = full_command(options.program, row, row.volume);
@@ -139,7 +139,7 @@ bool rehearse(const CompareOptions& options, const RunHooks& hooks, const std::v
   const io::ScratchFolder scratch(options.folder, ".tomofield-rehearsal");
   std::optional<NamedGrid> main;
   for (const Row& row : rows) {
-    const std::optional<Grid> grid = grid_to_be(options, hooks, row, scratch.path());
+    const std::optional<Grid> grid = grid_to_be(options, hooks, row, scratch);
     if (!grid) return false;
     if (!main) {
       main = {row.run.name, *grid};

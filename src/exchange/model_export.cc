@@ -55,7 +55,7 @@ std::vector<io::OutputLock> claim_export(const ExportFiles& files, const std::st
     }
     io::check_output_files(results, inputs, files.overwrite, advice);
     io::require_volume_name(files.output);
-    if (files.volume.zarr) output::check_zarr(files.output, files.overwrite, advice);
+    if (files.volume.zarr) output::check_zarr(files.output, inputs, files.overwrite, advice);
   });
 }
 

@@ -125,9 +125,6 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())),
       fitted_views_(measurement.fitted_views()),
       steps_per_epoch_(options_.subsets) {
-  if (options_.coarse_epochs > 0 && stages_.front().bin == 1 && options_.engine == Engine::kSlab)
-    base::log_info(
-        "no coarse stage: leaves of this --leaf-size do not end with slabs of coarse pixels");
   enter_stage();
   if (stage().bin > 1) resample_field();
   for (const double weight : binned_->noise_weights())

@@ -156,9 +156,13 @@ std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& s
 void set_unit(const std::vector<ViewBrightness>& views, const tilt_series::TiltSeries& series,
               Measurement& prepared) {
   const geometry::TiltGeometry& g = prepared.geometry;
-  std::vector<double> contrasts;
-  for (const ViewBrightness& view : views) contrasts.push_back(view.contrast);
+  std::vector<double> contrasts, levels;
+  for (const ViewBrightness& view : views) {
+    contrasts.push_back(view.contrast);
+    levels.push_back(view.mean);
+  }
   require_common_units(series, contrasts);
+  warn_of_levels(series, levels);
   std::vector<std::pair<double, double>> contrast_by_tilt;
   double mean_density = 0, brightness = 0;
   for (int v = 0; v < g.num_views(); ++v) {

@@ -153,7 +153,7 @@ constexpr Row kRows[] = {
      MEMBER(options.views, amplitude_contrast), .group = Group::kTransfer, .range = Range::between(0, 1),
      .automatic = "that of --ctf, else 0.07", .help = "Share of the contrast that is absorption"},
     {.key = "input.dose_per_tilt", .flag = "--dose-per-tilt", MEMBER(options.views, dose_per_tilt),
-     .group = Group::kTransfer, .unit = "electrons per Å²", .range = Range::between(0, 1e6),
+     .group = Group::kTransfer, .unit = "electrons per Å²", .range = Range::between(0, 1e4),
      .automatic = "with a contrast transfer the doses of --mdoc or of a table of views, else 0",
      .help = "Dose of each view, in the order of --mdoc or of a table of views, else in that of the "
              "stack: the fit expects less detail of late views. 0: no radiation damage"},
@@ -164,7 +164,8 @@ constexpr Row kRows[] = {
     // Specimen
     {.key = "specimen.thickness", .flag = "--thickness", MEMBER(options.specimen, thickness),
      .group = Group::kSpecimen, .unit = kUnbinned, .range = Range::between(1, 1e6),
-     .help = "Thickness of the tomogram along Z", .is_common = true, .is_required = true},
+     .help = "Thickness of the tomogram along Z", .is_common = true, .is_required = true,
+     .is_of_project = true},
     {.key = "specimen.roi", .flag = "--roi", MEMBER(options.specimen, roi), .group = Group::kSpecimen,
      .label = "X0,Y0,X1,Y1", .unit = kUnbinned, .automatic = "the whole field of view",
      .help = "Region of interest at zero tilt; X1 and Y1 lie outside",

@@ -97,7 +97,8 @@ struct Row {
   std::string_view automatic = {};  ///< says what is chosen where no value is given
   std::string_view help;
   bool is_common = false;       ///< shown by --help; --help-all shows all options
-  bool is_required = false;     ///< the command line refuses to do without
+  bool is_required = false;     ///< a run refuses to do without
+  bool is_of_project = false;   ///< a project may state what is required
   std::string_view rival = {};  ///< key of the option that a user gives in place of this one
 };
 

@@ -52,9 +52,13 @@ std::string winner_over(const Setting& setting, const Choices& choices) {
 
 void set_from_setting(const Setting& setting, Choices& choices) {
   const std::string wanted = set_flag_from_text(setting.option, setting.value, choices);
-  if (wanted.empty()) return;
-  throw Error(fmt::format("'{}': {} must be {}, not '{}'", setting.file.string(), setting.entry,
-                          wanted, setting.value));
+  if (!wanted.empty())
+    throw Error(fmt::format("'{}': {} must be {}, not '{}'", setting.file.string(), setting.entry,
+                            wanted, setting.value));
+  for (const Row& row : rows_of_flag(setting.option))
+    if (const std::string fault = range_fault(row, choices); !fault.empty())
+      throw Error(fmt::format("'{}': {} cannot be '{}': {}", setting.file.string(), setting.entry,
+                              setting.value, fault));
 }
 
 bool is_as_set(const Setting& setting, const Choices& choices) {
@@ -110,12 +114,13 @@ void settle_settings(Choices& choices) {
     const Row& row = rows.front();
     if (!is_as_set(setting, choices)) {
       setting.instead = as_given(row.flag, choices);
-      // A rival that the same project set is no choice of the user.
-    } else if (row.rival.empty() || !is_of_setting(row.rival, choices)) {
-      setting.instead = given_against(row, choices);
-      if (!setting.instead.empty())
-        for (const Row& of_flag : rows) reset(of_flag, choices);
+      continue;
     }
+    // A rival that the same project set is no choice of the user.
+    if (!row.rival.empty() && is_of_setting(row.rival, choices)) continue;
+    setting.instead = given_against(row, choices);
+    if (setting.instead.empty()) continue;
+    for (const Row& of_flag : rows) reset(of_flag, choices);
   }
 }
 

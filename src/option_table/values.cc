@@ -310,7 +310,7 @@ namespace {
 
 // Returns what is wrong with a number that is out of its range.
 template <typename Number>
-std::string range_fault(const Row& row, Number number, const Choices& choices) {
+std::string range_sentence(const Row& row, Number number, const Choices& choices) {
   const std::string flag(flag_of(row.key)), range = row.range.text();
   if (text_of(row, {}) == text_of(row, choices))  // a default that stands for no value
     return fmt::format("{} is required: it must be {}", flag, range);
@@ -323,25 +323,31 @@ std::string range_fault(const Row& row, Number number, const Choices& choices) {
 
 }  // namespace
 
+std::string range_fault(const Row& row, const Choices& choices) {
+  return visit_value(row, choices, [&]<typename T>(const T& value) -> std::string {
+    using Value = typename Plain<T>::type;
+    if constexpr (kIsNumber<Value>) {
+      const auto fault_of = [&](Value number) {
+        return row.range.contains(static_cast<double>(number))
+                   ? std::string()
+                   : range_sentence(row, number, choices);
+      };
+      if constexpr (kIsOptional<T>)
+        return value.has_value() ? fault_of(*value) : std::string();
+      else
+        return fault_of(value);
+    } else {
+      return {};
+    }
+  });
+}
+
 std::vector<std::string> range_faults(const Options& options) {
   std::vector<std::string> faults;
   const Choices choices{{}, options};
-  for (const Row& row : all_rows()) {
-    visit_value(row, choices, [&]<typename T>(const T& value) {
-      using Value = typename Plain<T>::type;
-      if constexpr (kIsNumber<Value>) {
-        const auto require = [&](Value number) {
-          if (!row.range.contains(static_cast<double>(number)))
-            faults.push_back(range_fault(row, number, choices));
-        };
-        if constexpr (kIsOptional<T>) {
-          if (value.has_value()) require(*value);
-        } else {
-          require(value);
-        }
-      }
-    });
-  }
+  for (const Row& row : all_rows())
+    if (std::string fault = range_fault(row, choices); !fault.empty())
+      faults.push_back(std::move(fault));
   return faults;
 }
 

@@ -42,8 +42,10 @@ std::string label_of(const Row& row);
 /// Returns true if an option is a flag without a value.
 bool is_flag(const Row& row);
 
-/// Returns a sentence for every number that is out of its range: "--rank must be from 1 to 256,
-/// not 0". A number whose default is out of its range is required.
+/// Returns a sentence if the number of an option is out of its range: "--rank must be from 1 to
+/// 256, not 0", else an empty text. A number whose default is out of its range is required.
+std::string range_fault(const Row& row, const Choices& choices);
+/// Returns these sentences for all options.
 std::vector<std::string> range_faults(const Options& options);
 
 /// Returns all options as nested objects, named after the keys of the table. Options that have no

@@ -183,8 +183,8 @@ TEST(OptionTable, SettingsSayWhatHoldsInTheirPlace) {
   EXPECT_EQ(instead(), "--thickness 200;--center 13,3.5;--angpix 10;--cs none;");
 }
 
-// What a project sets beside options that somebody gave: "--bin 2;--angpix 10" for the option and
-// what holds in its place.
+// Applies a setting of a project beside options that somebody gave. Returns the value that the
+// option has then, and what holds in place of the setting: "1;--angpix 10".
 std::string applied(const Setting& setting, Choices choices) {
   apply_settings({setting}, choices);
   return fmt::format("{};{}", flag_text_of(setting.option, choices),

@@ -1,14 +1,15 @@
 #include "options/run_options.h"
 
 #include <fmt/format.h>
-#include <cstdlib>
 
 #include <algorithm>
 #include <bit>
+#include <cstdlib>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "base/check.h"
 #include "compact/budget.h"
 #include "fit/constants.h"
 #include "fit/integer_program.h"
@@ -63,101 +64,111 @@ bool may_learn(const Options& options) {
 
 constexpr double kLeastFactor = 0.05, kMostFactor = 20;
 
-// The sentences on options that do not go together.
-class Faults {
- public:
-  void refuse_if(bool is_fault, const char* sentence) {
-    if (is_fault) sentences_.emplace_back(sentence);
-  }
-  // Adds what a function throws.
-  template <typename Check>
-  void refuse_what_throws(const char* flag, const Check& check) {
-    try {
-      check();
-    } catch (const Error& error) {
-      sentences_.push_back(std::string(flag) + error.what());
-    }
-  }
-  std::vector<std::string> sentences() && { return std::move(sentences_); }
-
- private:
-  std::vector<std::string> sentences_;
-};
-
 std::vector<std::string> faults_of_field(const ReconstructOptions& options) {
   const FieldOptions& field = options.field;
   const FitOptions& fit = options.fit;
-  Faults faults;
-  faults.refuse_if(
-      field.tree == TreeKind::kAdaptive && !fit::can_solve_integer_programs(),
-      "--tree adaptive needs COIN-OR CBC, and this tomofield was built without it: take "
-      "--tree uniform, or build tomofield with -DTOMOFIELD_WITH_CBC=ON");
-  faults.refuse_if(field.leaf_budget > 0 && field.tree == TreeKind::kUniform,
-                   "--leaf-budget is for --tree adaptive alone");
-  faults.refuse_if(
-      fit.vertex_epochs > 0 && fit.engine == Engine::kRay,
-      "--vertex-epochs needs --engine slab: with rays factors are fitted from the start");
-  faults.refuse_if(
+  base::Faults faults;
+  faults.add_if(field.tree == TreeKind::kAdaptive && !fit::can_solve_integer_programs(),
+                "--tree adaptive needs COIN-OR CBC, and this tomofield was built without it: take "
+                "--tree uniform, or build tomofield with -DTOMOFIELD_WITH_CBC=ON");
+  faults.add_if(field.leaf_budget > 0 && field.tree == TreeKind::kUniform,
+                "--leaf-budget is for --tree adaptive alone");
+  faults.add_if(fit.vertex_epochs > 0 && fit.engine == Engine::kRay,
+                "--vertex-epochs needs --engine slab: with rays factors are fitted from the start");
+  faults.add_if(
       fit.vertex_epochs > 0 && (field.kind != FieldKind::kVm || field.tree != TreeKind::kUniform),
       "--vertex-epochs is for the factors of a uniform tree: leave it out, or give --field "
       "vm and --tree uniform");
-  return std::move(faults).sentences();
+  return faults.sentences();
 }
 
 std::vector<std::string> faults_of_fit(const ReconstructOptions& options) {
   const FitOptions& fit = options.fit;
   const bool is_ray = fit.engine == Engine::kRay;
-  Faults faults;
-  faults.refuse_if(
+  base::Faults faults;
+  faults.add_if(
       fit.coarse_bin > 0 && !std::has_single_bit(static_cast<unsigned>(fit.coarse_bin)),
       "--coarse-bin is the largest of binnings that are halved from stage to stage: give a "
       "power of two, such as 2, 4 or 8");
-  faults.refuse_if(
+  faults.add_if(
       fit.prior != Prior::kTv && !may_learn(options),
       "--prior learned works on plain vertices a pixel apart: it needs --field grid, --tree "
       "uniform, --vertex-spacing 1 and --engine slab, and no --budget");
-  faults.refuse_what_throws("", [&] {
+  faults.collect([&] {
     const double factor = denoise_factor(fit.denoise);
-    faults.refuse_if(fit.density_variation == 0.0 && !options.chooses_weight() && factor != 1.0,
-                     "--denoise multiplies the weight of total variation, and --tv 0 turns that "
-                     "off: leave one of them out");
+    faults.add_if(fit.density_variation == 0.0 && !options.chooses_weight() && factor != 1.0,
+                  "--denoise multiplies the weight of total variation, and --tv 0 turns that "
+                  "off: leave one of them out");
   });
-  faults.refuse_if(
-      fit.patience > 0 && fit.hold_out == 0,
-      "--early-stop watches views that --hold-out keeps from the fit: give that as well");
-  faults.refuse_if(fit.hold_out > 0 && is_ray,
-                   "--hold-out predicts aligned views: it needs --engine slab");
-  faults.refuse_if(fit.tune && is_ray, "--tune predicts aligned views: it needs --engine slab");
-  faults.refuse_if(fit.tune && fit.patience > 0,
-                   "--tune chooses the number of epochs: leave --early-stop out");
-  return std::move(faults).sentences();
+  faults.add_if(fit.patience > 0 && fit.hold_out == 0,
+                "--early-stop watches views that --hold-out keeps from the fit: give that as well");
+  faults.add_if(fit.hold_out > 0 && is_ray,
+                "--hold-out predicts aligned views: it needs --engine slab");
+  faults.add_if(fit.tune && is_ray, "--tune predicts aligned views: it needs --engine slab");
+  faults.add_if(fit.tune && fit.patience > 0,
+                "--tune chooses the number of epochs: leave --early-stop out");
+  return faults.sentences();
 }
 
 std::vector<std::string> faults_of_run(const ReconstructOptions& options) {
   const RunOptions& run = options.run;
-  Faults faults;
-  faults.refuse_if(run.resume && run.overwrite,
-                   "--resume continues a run and --overwrite starts it over: give one of them");
-  faults.refuse_if(run.resume && run.output.empty(),
-                   "--resume continues from the files of an interrupted run: give their output");
-  faults.refuse_if(run.align != Alignment::kOff && options.fit.engine == Engine::kRay,
-                   "--align aligns views in their plane: it needs --engine slab");
-  return std::move(faults).sentences();
+  base::Faults faults;
+  faults.add_if(run.resume && run.overwrite,
+                "--resume continues a run and --overwrite starts it over: give one of them");
+  faults.add_if(run.resume && run.output.empty(),
+                "--resume continues from the files of an interrupted run: give their output");
+  faults.add_if(run.align != Alignment::kOff && options.fit.engine == Engine::kRay,
+                "--align aligns views in their plane: it needs --engine slab");
+  return faults.sentences();
 }
 
 std::vector<std::string> faults_of_budget(const ReconstructOptions& options) {
   const FieldOptions& field = options.field;
-  Faults faults;
+  base::Faults faults;
   if (!field.budget.empty()) {
-    faults.refuse_what_throws("--budget ", [&] { compact::parse_budget(field.budget); });
-    faults.refuse_if(field.kind != FieldKind::kGrid,
-                     "--budget makes plain vertices compact: give --field grid");
-    faults.refuse_if(options.makes_halves(),
-                     "--budget is for one fit, and halves need three: leave it out");
+    faults.collect([&] { compact::parse_budget(field.budget); }, "--budget ");
+    faults.add_if(field.kind != FieldKind::kGrid,
+                  "--budget makes plain vertices compact: give --field grid");
+    faults.add_if(options.makes_halves(),
+                  "--budget is for one fit, and halves need three: leave it out");
   }
-  faults.refuse_if(field.tile_rows.value_or(0) > 0 && field.budget.empty(),
-                   "--tile-rows fits tiles that are made compact: give --budget as well");
-  return std::move(faults).sentences();
+  faults.add_if(field.tile_rows.value_or(0) > 0 && field.budget.empty(),
+                "--tile-rows fits tiles that are made compact: give --budget as well");
+  return faults.sentences();
+}
+
+std::vector<std::string> faults_of_halves(const ReconstructOptions& options) {
+  const SeriesFiles& files = options.files;
+  const FitOptions& fit = options.fit;
+  base::Faults faults;
+  faults.add_if(files.even.has_value() != files.odd.has_value(),
+                "--even and --odd are the two halves of the frames: give both");
+  faults.add_if(files.even && files.odd && fit.split_tilts,
+                "--even and --odd divide the frames, --split-tilts the tilts: choose one of them");
+  faults.add_if(fit.denoising_halves && !options.makes_halves(),
+                "--denoising-halves needs halves: give --even and --odd, or --split-tilts");
+  if (!options.makes_halves()) return faults.sentences();
+  faults.add_if(fit.engine == Engine::kRay, "halves need --engine slab");
+  faults.add_if(options.field.tree == TreeKind::kAdaptive,
+                "halves need --tree uniform, because adaptive trees of two fits would differ");
+  faults.add_if(fit.patience > 0,
+                "halves need fits of the same length: leave --early-stop out, or choose --epochs");
+  faults.add_if(options.run.output.empty(), "halves are written as files: name the tomogram");
+  return faults.sentences();
+}
+
+// What filters views needs them aligned.
+std::vector<std::string> faults_of_filters(const ReconstructOptions& options) {
+  const bool is_ray = options.fit.engine == Engine::kRay;
+  base::Faults faults;
+  faults.add_if(
+      is_ray && measurement::wants_transfers(options.files, options.views),
+      "--ctf, --defocus, --dose-per-tilt and --mtf filter aligned views: they need --engine "
+      "slab");
+  faults.add_if(
+      is_ray && options.fit.noise_model == NoiseModel::kColoured,
+      "--noise-model coloured weights the frequencies of aligned views: it needs --engine slab");
+  return faults.sentences();
 }
 
 }  // namespace
@@ -219,45 +230,9 @@ std::vector<std::string> ReconstructOptions::faults() const {
   add(faults_of_fit(*this));
   add(faults_of_run(*this));
   add(faults_of_budget(*this));
-  add(faults_of_halves());
-  add(faults_of_transfer());
-  return all;
-}
-
-// Returns a sentence for each option that does not go with halves, or needs them.
-std::vector<const char*> ReconstructOptions::faults_of_halves() const {
-  std::vector<const char*> all;
-  const auto refuse_if = [&](bool is_fault, const char* sentence) {
-    if (is_fault) all.push_back(sentence);
-  };
-  refuse_if(files.even.has_value() != files.odd.has_value(),
-            "--even and --odd are the two halves of the frames: give both");
-  refuse_if(files.even && files.odd && fit.split_tilts,
-            "--even and --odd divide the frames, --split-tilts the tilts: choose one of them");
-  refuse_if(fit.denoising_halves && !makes_halves(),
-            "--denoising-halves needs halves: give --even and --odd, or --split-tilts");
-  if (!makes_halves()) return all;
-  refuse_if(fit.engine == Engine::kRay, "halves need --engine slab");
-  refuse_if(field.tree == TreeKind::kAdaptive,
-            "halves need --tree uniform, because adaptive trees of two fits would differ");
-  refuse_if(fit.patience > 0,
-            "halves need fits of the same length: leave --early-stop out, or choose --epochs");
-  refuse_if(run.output.empty(), "halves are written as files: name the tomogram");
-  return all;
-}
-
-// Returns a sentence for each option of contrast transfer, dose and noise that does not go with
-// others.
-std::vector<const char*> ReconstructOptions::faults_of_transfer() const {
-  std::vector<const char*> all = measurement::faults_of_transfer(files, views);
-  if (fit.engine != Engine::kRay) return all;
-  if (measurement::wants_transfers(files, views))
-    all.push_back(
-        "--ctf, --defocus, --dose-per-tilt and --mtf filter aligned views: they need --engine "
-        "slab");
-  if (fit.noise_model == NoiseModel::kColoured)
-    all.push_back(
-        "--noise-model coloured weights the frequencies of aligned views: it needs --engine slab");
+  add(faults_of_halves(*this));
+  add(measurement::faults_of_transfer(files, views));
+  add(faults_of_filters(*this));
   return all;
 }
 

@@ -62,10 +62,6 @@ struct ReconstructOptions : Options {
   std::vector<std::string> faults() const;
   /// Returns a sentence for each option that a job of several processes cannot have.
   std::vector<std::string> faults_of_job() const;
-
- private:
-  std::vector<const char*> faults_of_halves() const;
-  std::vector<const char*> faults_of_transfer() const;
 };
 
 /// Resolves the options and hands them to the layers below. Where trials choose an option, it gets

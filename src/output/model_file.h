@@ -30,6 +30,9 @@ inline constexpr std::int64_t kCompactVersion = 3;  ///< of models with codes in
 /// plausible (base/plausible.h).
 void require_plausible_parameters(const field::Field& field, const std::string& complaint);
 
+/// Throws Error, with what may help, if such a parameter shows that a fit has diverged.
+void require_converged(const field::Field& field);
+
 /// The meaning of a field: its place, its scale and its source.
 struct ModelInfo {
   geometry::TiltGeometry geometry;
@@ -98,9 +101,6 @@ void save_model(const std::filesystem::path& path, const field::Field& field, co
 void save_model(const std::filesystem::path& path, const field::Field& field,
                 const FloatSource& parameters, const ModelInfo& info, const TrainingState* training,
                 const FloatArrays& more_floats);
-/// Throws Error if a parameter that is kept is not finite. The message names `path`, the file that
-/// would have been written.
-void require_finite(const field::Field& field, const std::filesystem::path& path);
 /// Writes a model; of a compact one the codes, and no training state.
 void save_model(const std::filesystem::path& path, const Model& model,
                 const TrainingState* training = nullptr);

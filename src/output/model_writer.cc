@@ -170,15 +170,16 @@ void require_plausible_parameters(const field::Field& field, const std::string& 
   throw Error(fmt::format("{}: parameter {} is {}", complaint, *first_bad, parameters[*first_bad]));
 }
 
-void require_finite(const field::Field& field, const std::filesystem::path& path) {
-  require_plausible_parameters(field, fmt::format("the fit diverged, so '{}' is left as it was; a "
-                                                  "lower learning rate may help",
-                                                  path.string()));
+void require_converged(const field::Field& field) {
+  require_plausible_parameters(
+      field,
+      "the fit diverged, and no file is replaced; check --contrast and --black-level, and look for "
+      "views whose grey levels differ from the rest; a lower --learning-rate may help, too");
 }
 
 void save_model(const std::filesystem::path& path, const field::Field& field, const ModelInfo& info,
                 const TrainingState* training, const FloatArrays& more_floats) {
-  require_finite(field, path);
+  require_converged(field);
   save_model(path, field, FloatSource(field.parameters()), info, training, more_floats);
 }
 

@@ -37,8 +37,9 @@ field::OrientedBox small_part(const Model& model, const field::OrientedBox& box)
 
 void announce_sampling(const Model& model, const field::OrientedBox& box, std::size_t count) {
   constexpr double kFewPoints = 1 << 27, kShort_s = 10, kLong_s = 600;
+  constexpr std::size_t kFewBoxes = 10000;
   const double points = field::num_points(box) * static_cast<double>(count);
-  if (points < kFewPoints) return;
+  if (points < kFewPoints && count < kFewBoxes) return;
   const field::OrientedBox part = small_part(model, box);
   const auto begin = std::chrono::steady_clock::now();
   sample_box(model, part);

@@ -16,7 +16,9 @@
 #include "distributed/gathered_arrays.h"
 #include "io/images/mrc_format.h"
 #include "io/images/ome_zarr.h"
+#include "io/images/zarr_store.h"
 #include "io/saving/atomic_folder.h"
+#include "io/saving/output_files.h"
 #include "io/saving/output_set.h"
 #include "io/saving/output_target.h"
 #include "output/box_bounds.h"
@@ -183,8 +185,11 @@ void write_zarr(const std::filesystem::path& volume, ZarrVersion version) {
                      volume.stem().string(), version);
 }
 
-void check_zarr(const std::filesystem::path& volume, bool may_replace, const std::string& advice) {
+void check_zarr(const std::filesystem::path& volume,
+                const std::vector<std::filesystem::path>& inputs, bool may_replace,
+                const std::string& advice) {
   const std::filesystem::path zarr = zarr_path(volume);
+  io::require_no_input_is_replaced({zarr}, inputs);
   io::require_replaceable_zarr(zarr);
   if (!may_replace && std::filesystem::exists(zarr))
     throw Error(fmt::format("'{}' exists: {}", zarr.string(), advice));

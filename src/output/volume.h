@@ -38,8 +38,10 @@ std::vector<std::string> faults_of(const VolumeOptions& options);
 std::filesystem::path zarr_path(const std::filesystem::path& volume);
 
 /// Checks before any work that this copy can be written. Throws Error, with `advice`, if the folder
-/// exists, unless `may_replace`, and if something else is there.
-void check_zarr(const std::filesystem::path& volume, bool may_replace, const std::string& advice);
+/// exists, unless `may_replace`, if something else is there, and if one of the `inputs` lies in it.
+void check_zarr(const std::filesystem::path& volume,
+                const std::vector<std::filesystem::path>& inputs, bool may_replace,
+                const std::string& advice);
 
 /// Writes this copy of a volume, which may wait in an io::OutputSet.
 void write_zarr(const std::filesystem::path& volume, ZarrVersion version);

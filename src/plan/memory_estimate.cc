@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numeric>
+#include <span>
+#include <vector>
 
 #include "base/threads/parallel.h"
 #include "field/vm/factorise.h"
@@ -31,6 +35,17 @@ std::size_t band_memory(const measurement::Measurement& plan, const fit::Domain&
   const std::size_t views =
       static_cast<std::size_t>(views_a_step) * static_cast<std::size_t>(plan.geometry.width) * kRow;
   return kSlabsOfBand * (2 * slab + views) + 3 * slab / kernels::kLanes;
+}
+
+// Returns the bytes of the vertices of one leaf a thread, of the largest leaves.
+std::size_t leaves_of_threads(const fit::Domain& domain) {
+  std::vector<std::size_t> bytes;
+  for (const field::LeafShape& shape : domain.shapes)
+    bytes.push_back(shape.vertices_xz() * static_cast<std::size_t>(shape.ny) * sizeof(float));
+  const auto count = std::min(std::ssize(bytes), std::ptrdiff_t{base::thread_count()});
+  const auto largest = std::span(bytes).first(static_cast<std::size_t>(count));
+  std::ranges::partial_sort(bytes, bytes.begin() + count, std::greater{});
+  return std::accumulate(largest.begin(), largest.end(), std::size_t{0});
 }
 
 // Returns the part of all parameters that this process keeps: its own and those of its neighbours
@@ -189,11 +204,13 @@ std::size_t estimate_memory(const PlannedFit& planned, const std::vector<fit::St
           : 0;
   const std::size_t fitting =
       parameters + surrogates + static_cast<std::size_t>(prior_memory(planned)) +
-      static_cast<std::size_t>(bands_in_use) * band_memory(plan, domain, views_a_step) +
+      std::max(static_cast<std::size_t>(bands_in_use) * band_memory(plan, domain, views_a_step),
+               leaves_of_threads(domain)) +  // whose spikes are limited
       static_cast<std::size_t>(base::thread_count()) * thread_memory(plan, domain);
   const std::size_t tracing =
-      plan.ray_geometry ? objective::RayDataTerm::working_memory(*plan.ray_geometry, domain.tree,
-                                                                 options.fit, plan.rays_shape())
+      plan.ray_geometry ? leaves_of_threads(domain) +
+                              objective::RayDataTerm::working_memory(
+                                  *plan.ray_geometry, domain.tree, options.fit, plan.rays_shape())
                         : 0;
   const std::size_t program = kProgramBytes + (processes.size() > 1 ? kMpi : 0);
   const std::size_t decoding = measurement::decoding_memory(series, plan, processes);

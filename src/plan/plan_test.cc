@@ -117,6 +117,14 @@ TEST_F(Plan, MoreParametersNeedMoreMemory) {
   EXPECT_GE(fine.memory_bytes, 16 * fine.num_parameters);
 }
 
+TEST_F(Plan, CountsTheLeavesThatTheRayEngineCopies) {
+  options_.fit.engine = Engine::kRay;
+  options_.field.leaf_size = 512;  // one leaf has nearly all parameters
+  const RunPlan run = plan();
+  // Beside the four numbers of a parameter: a leaf that is traced, and one that loses its spikes.
+  EXPECT_GE(run.memory_bytes, 22 * run.num_parameters);
+}
+
 TEST_F(Plan, RefusesWhatTheMachineCannotHold) {
   RunPlan run = plan();
   EXPECT_NO_THROW(require_memory(run));

@@ -12,6 +12,7 @@
 #include "align/alignment.h"
 #include "base/progress.h"
 #include "fit/stages.h"
+#include "io/saving/output_target.h"
 #include "io/saving/scratch_memory.h"
 #include "measurement/prepare.h"
 #include "measurement/slab_views.h"
@@ -182,6 +183,19 @@ double num_voxels(const RunPlan& run) {
          std::round(run.thickness);
 }
 
+// Returns the bytes of the parameters of all fits.
+std::size_t parameter_bytes(const RunPlan& run) {
+  return sizeof(float) * run.num_parameters * static_cast<std::size_t>(run.num_fits);
+}
+
+// Returns the bytes of the volumes: of halves the tomogram, both halves, the uncertainty and the
+// local resolution.
+std::size_t volume_bytes(const RunPlan& run, const VolumeOptions& options) {
+  const std::size_t num_volumes = run.num_fits == 1 ? 1 : 5;
+  const double bytes_a_voxel = options.voxel_type == VoxelType::kFloat32 ? 4 : 2;
+  return num_volumes * static_cast<std::size_t>(num_voxels(run) * bytes_a_voxel);
+}
+
 // Returns the bytes of the scratch files of the decoded views and of the rays.
 std::size_t scratch_bytes(const tilt_series::PlannedSeries& series,
                           const measurement::Measurement& plan) {
@@ -199,13 +213,8 @@ RunEstimate estimate_run(const tilt_series::PlannedSeries& series,
   measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
   plan.transfers = measurement::view_transfers(options.input(), options.specimen.hand, series);
   RunEstimate estimate;
-  const auto num_fits = static_cast<std::size_t>(run.num_fits);
-  const std::size_t parameters = sizeof(float) * run.num_parameters * num_fits;
-  const auto volume = static_cast<std::size_t>(
-      num_voxels(run) * (options.volume.voxel_type == VoxelType::kFloat32 ? 4 : 2));
-  // Beside the tomogram there are both halves, the uncertainty and the local resolution.
-  const std::size_t num_volumes = run.num_fits == 1 ? 1 : 5;
-  estimate.result_bytes = num_volumes * volume + parameters + kSmallFiles;
+  const std::size_t parameters = parameter_bytes(run);
+  estimate.result_bytes = volume_bytes(run, options.volume) + parameters + kSmallFiles;
   // A checkpoint has the parameters and two moments, and is there twice while it is replaced. With
   // tiles it is that of the coarse stages.
   const std::size_t in_checkpoint =
@@ -228,6 +237,14 @@ RunEstimate estimate_run(const tilt_series::PlannedSeries& series,
       work.updates_of_views * of_view.update +
       readings * kReadingsOfAView * of_view.decoding * static_cast<double>(series.views().size());
   return estimate;
+}
+
+void require_disk(const RunPlan& run, const options::ReconstructOptions& options) {
+  const std::filesystem::path& output = options.run.output;
+  if (output.empty()) return;
+  std::size_t bytes = volume_bytes(run, options.volume);
+  if (!run.tiles.is_used()) bytes += parameter_bytes(run);  // codes are small
+  io::require_room(io::folder_of(output), output, static_cast<std::int64_t>(bytes));
 }
 
 }  // namespace tomofield::plan

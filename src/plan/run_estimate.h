@@ -29,4 +29,7 @@ struct RunEstimate {
 RunEstimate estimate_run(const tilt_series::PlannedSeries& series,
                          const options::ReconstructOptions& options, const RunPlan& plan);
 
+/// Throws Error if the disk has less room than the volumes and models of a run take.
+void require_disk(const RunPlan& plan, const options::ReconstructOptions& options);
+
 }  // namespace tomofield::plan

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "io/saving/output_files.h"
 #include "option_table/values.h"
 #include "tomofield/error.h"
 
@@ -123,6 +124,7 @@ std::optional<Project> read_project(const Request& request) {
   project.add_file(main.path);
   main.format->read(project);
   project.require_no_stray_ignored();
+  for (const fs::path& file : project.files()) io::add_input(file);
   return project;
 }
 

@@ -189,8 +189,7 @@ bool align_series(options::ReconstructOptions& options, const tune::TuneHooks& h
   if (options.run.align == Alignment::kFull && !record.is_accepted) {
     base::log_warning(
         "the views are as good as not aligned, since no alignment predicted views better than "
-        "none: "
-        "check --tilt-axis and --thickness, or align them with another program");
+        "none: check --tilt-axis and --thickness, or align them with another program");
   }
   return true;
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -16,6 +17,7 @@
 #include "checkpoint/finished_tiles.h"
 #include "exchange/alignment_output.h"
 #include "fit/domain.h"
+#include "fit/stages.h"
 #include "io/saving/output_set.h"
 #include "io/saving/scratch_memory.h"
 #include "measurement/background.h"
@@ -25,6 +27,7 @@
 #include "options/run_options.h"
 #include "output/output_paths.h"
 #include "plan/plan.h"
+#include "plan/run_estimate.h"
 #include "realign/aligned_series.h"
 #include "reconstruct/halves.h"
 #include "reconstruct/results.h"
@@ -180,6 +183,21 @@ void note_axis(const tilt_series::PlannedSeries& series, options::ReconstructOpt
                               .entry = ""});
 }
 
+// Says if leaves are too small for the coarse stages that were asked for.
+void log_coarse_stages(const plan::RunPlan& plan, const options::ReconstructOptions& options) {
+  const FitOptions& fit = options.fit;
+  if (fit.coarse_epochs == 0 || fit.engine != Engine::kSlab) return;
+  const int coarsest = std::ranges::max_element(plan.stages, {}, &fit::Stage::bin)->bin;
+  if (coarsest == 1)
+    base::log_info(
+        "no coarse stage: leaves of this --leaf-size do not end with slabs of coarse pixels");
+  else if (fit.coarse_bin > std::max(coarsest, FitOptions().coarse_bin))
+    base::log_info(
+        fmt::format("coarse pixels are at most {0} × {0} and not {1} × {1} (--coarse-bin)"
+                    ", because leaves have {2} pixels a side (--leaf-size)",
+                    coarsest, fit.coarse_bin, *options.field.leaf_size));
+}
+
 // Plans the run, and tells the observer.
 plan::RunPlan make_plan(const tilt_series::PlannedSeries& series,
                         const options::ReconstructOptions& options, const Observer& observer,
@@ -187,11 +205,13 @@ plan::RunPlan make_plan(const tilt_series::PlannedSeries& series,
   plan::RunPlan plan;
   processes.run_collectively([&] {
     plan = plan::require_possible_run(series, options, processes);
+    if (processes.is_root()) plan::require_disk(plan, options);
     if (plan.has_too_few_views_for_trials)
       base::log_info(fmt::format(
           "{} views are too few for trials, which leave some of them out and need {} or more: "
           "what they would choose has its usual value (--tv-penalty, --tv and --prior give others)",
           plan.num_views, options::kFewestViewsOfTrials));
+    log_coarse_stages(plan, options);
     if (observer.planned) observer.planned(plan);
   });
   return plan;

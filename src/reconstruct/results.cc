@@ -222,6 +222,7 @@ record::RunRecord run_record(const options::ReconstructOptions& options, record:
 RunResult finish(fit::Fit& fit, const Run& run, const FitOutcome& outcome) {
   const measurement::Measurement& measured = run.measurement;
   const checkpoint::FitOrigin& origin = outcome.origin;
+  run.processes.run_collectively([&] { output::require_converged(fit.field()); });
   fit.free_optimizer();  // the verdict and a compact model need the memory
   record::FitRecord found = examine(fit, measured, run, outcome);
   std::optional<measurement::PredictedView> view;

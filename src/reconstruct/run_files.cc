@@ -10,6 +10,7 @@
 #include "base/log.h"
 #include "checkpoint/checkpoint.h"
 #include "exchange/exchange_files.h"
+#include "io/images/png.h"
 #include "io/saving/output_files.h"
 #include "output/output_paths.h"
 #include "output/volume.h"
@@ -68,7 +69,8 @@ std::vector<std::filesystem::path> files_of(const options::ReconstructOptions& o
 
 // Returns the pictures that only some runs draw.
 std::vector<std::filesystem::path> optional_pictures(const output::OutputPaths& paths) {
-  return {paths.tree_picture, paths.held_out_picture, paths.choice_picture, paths.fsc_picture};
+  return {paths.tree_picture, paths.held_out_picture, paths.choice_picture,
+          paths.fsc_picture,  paths.dial_picture,     paths.prior_picture};
 }
 
 }  // namespace
@@ -88,9 +90,10 @@ void check_options(const options::ReconstructOptions& options) {
   const output::OutputPaths paths = output::output_paths(options.run.output);
   const bool may_replace = options.run.overwrite || can_resume(options, paths);
   const std::string advice = advice_on_old_files(options, paths);
-  io::check_output_files(files_of(options, paths), io::input_files(options.files), may_replace,
-                         advice);
-  if (options.volume.zarr) output::check_zarr(paths.volume, may_replace, advice);
+  const std::vector<std::filesystem::path> inputs = io::input_files(options.files);
+  io::check_output_files(files_of(options, paths), inputs, may_replace, advice);
+  if (options.run.overwrite) io::require_no_input_is_replaced(optional_pictures(paths), inputs);
+  if (options.volume.zarr) output::check_zarr(paths.volume, inputs, may_replace, advice);
 }
 
 std::vector<io::OutputLock> claim_outputs(const options::ReconstructOptions& options) {
@@ -111,14 +114,14 @@ std::vector<io::OutputLock> claim_outputs(const options::ReconstructOptions& opt
 void remove_stale_files(const options::ReconstructOptions& options, io::OutputSet& results) {
   if (!options.run.overwrite) return;
   const output::OutputPaths paths = output::output_paths(options.run.output);
-  std::vector<std::filesystem::path> stale;
-  if (!options.chooses_weight()) stale.push_back(paths.dial_picture);
-  if (!options.open_settings().prior) stale.push_back(paths.prior_picture);
-  for (const std::filesystem::path& picture : optional_pictures(paths))
-    if (!results.contains(picture)) stale.push_back(picture);
+  // The run has drawn these two already.
+  const auto is_drawn = [&](const std::filesystem::path& picture) {
+    return (picture == paths.dial_picture && options.chooses_weight()) ||
+           (picture == paths.prior_picture && options.open_settings().prior);
+  };
   std::vector<std::string> removed;
-  for (const std::filesystem::path& picture : stale) {
-    if (!std::filesystem::is_regular_file(picture)) continue;
+  for (const std::filesystem::path& picture : optional_pictures(paths)) {
+    if (results.contains(picture) || is_drawn(picture) || !io::is_png(picture)) continue;
     results.remove_old(picture);
     removed.push_back(picture.filename().string());
   }

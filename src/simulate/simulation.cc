@@ -52,6 +52,7 @@ namespace {
 
 void apply_yardstick_d(SimulationOptions& options) {
   constexpr double kThickness_A = 1120.0, kFieldOfBeads_A = 2560.0, kBeads = 8.0, kGold_V = 25.0;
+  if (!base::is_plausible_pixel_size(options.voxel_size_A)) return;  // validate() says so
   CellOptions& cell = options.cell;
   cell.content = Content::kCryo;
   cell.is_extended = true;
@@ -90,7 +91,6 @@ std::vector<std::string> SimulationOptions::validate() const {
     if (!holds) faults.push_back(fmt::format("{} is {}, but must be {}", name, value, range));
   };
   const auto in_sizes = [](std::int64_t n) { return n >= 8 && n <= kMaxSize_px; };
-  const auto is_positive = [](double v) { return std::isfinite(v) && v > 0.0; };
   const auto is_spread = [](double v, double most) { return v >= 0.0 && v <= most; };
   const std::string sizes = fmt::format("8 to {} pixels", kMaxSize_px);
   require(in_sizes(cell.size_px), "the size", static_cast<double>(cell.size_px), sizes);
@@ -98,10 +98,11 @@ std::vector<std::string> SimulationOptions::validate() const {
           sizes);
   require(base::is_plausible_pixel_size(voxel_size_A), "the voxel size", voxel_size_A,
           fmt::format("{} to {} Å", base::kPixelSizes_A.low(), base::kPixelSizes_A.high()));
-  require(is_spread(noise, 1e6), "the noise", noise, "0 or more");
-  require(!dose || (is_positive(*dose) && *dose <= 1e9), "the dose", dose.value_or(0.0),
-          "above 0 electrons per pixel and view, and at most 1e9");
-  require(is_positive(absorption_per_A), "the absorption", absorption_per_A, "above 0 per Å");
+  require(is_spread(noise, 1e6), "the noise", noise, "0 to 1e6");
+  require(!dose || (*dose >= 1e-3 && *dose <= 1e9), "the dose", dose.value_or(0.0),
+          "0.001 to 1e9 electrons per pixel and view");
+  require(absorption_per_A > 0.0 && absorption_per_A <= 1.0, "the absorption", absorption_per_A,
+          "above 0 and at most 1 per Å");
   require(is_spread(gain_spread, 2.0), "the gain's spread", gain_spread, "0 to 2");
   const auto size = static_cast<double>(cell.size_px);
   const Misalignment& m = misalignment;
@@ -145,8 +146,8 @@ std::vector<std::string> SimulationOptions::validate() const {
     require(cell.bead_diameter_px > 0.0 && cell.bead_diameter_px <= room,
             "the gold beads' diameter in voxels", cell.bead_diameter_px,
             fmt::format("above 0 and at most {}", room));
-    require(std::isfinite(cell.bead_density), "the gold beads' density", cell.bead_density,
-            "finite");
+    require(std::abs(cell.bead_density) <= 1e6, "the gold beads' density", cell.bead_density,
+            "-1e6 to 1e6");
   }
   if (const auto fault = fault_of(tilts)) faults.push_back(*fault);
   return faults;

@@ -104,6 +104,18 @@ constexpr double kMostOverfit = 1.6;
 // Beside the sections that are not empty, the suggested thickness has this part of them.
 constexpr double kRoom = 0.2;
 
+// Standard deviation of a section in units of the contrast of the views: 0.01 and more where there
+// is a specimen.
+constexpr double kLeastDeviation = 1e-6;
+
+std::optional<Warning> empty_tomogram(const std::vector<double>& section_deviation) {
+  if (section_deviation.empty() || std::ranges::max(section_deviation) > kLeastDeviation)
+    return std::nullopt;
+  return Warning{"empty",
+                 "the tomogram is empty, because every voxel has the same density: look for views "
+                 "whose grey levels differ from the rest, and check --contrast and --black-level"};
+}
+
 std::optional<Warning> wrong_contrast(const Verdict& verdict, Contrast given) {
   const PathEffect& path = verdict.views->path;
   const bool is_sure = verdict.residual > kResidualOfWrongContrast && !verdict.defocus;
@@ -393,6 +405,7 @@ std::vector<Warning> faults_of_views(const Verdict& verdict, const GivenInput& i
 
 std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& input) {
   std::vector<Warning> warnings;
+  if (const auto empty = empty_tomogram(verdict.artefacts.section_deviation)) return {*empty};
   if (verdict.views) warnings = faults_of_views(verdict, input);
   if (!warnings.empty()) return warnings;
   const auto add = [&](std::optional<Warning> found) {

@@ -243,12 +243,18 @@ def test_views_in_other_units_are_named(good, refuse_series, stack_file, tmp_pat
         values[4] *= np.float32(factor)
         refuse_series(["section 5", "other units", "--exclude 5"], stack_file("units.mrc", values),
                       "--contrast", "dark")
-    for factor, warns in ((100, True), (0.01, True), (10, False)):
+    for factor, offset, says in ((100, 0, "times those of the other views"),
+                                 (0.01, 0, "times those of the other views"),
+                                 (1, 100, "grey level of section 5 (tilt"), (1, 2, None)):
         values = structured.copy()
-        values[4] *= np.float32(factor)
+        values[4] = values[4] * np.float32(factor) + np.float32(offset)
         name = stack_file("units.mrc", values)
-        result = harness.succeed("reconstruct", name, "-o", tmp_path / f"{factor}.mrc", *good)
-        assert ("section 5" in result.stderr and "--exclude 5" in result.stderr) == warns, result
+        said = harness.succeed("reconstruct", name, "-o", tmp_path / f"{factor}_{offset}.mrc",
+                               *good).stderr
+        if says:
+            assert says in said and "--exclude 5" in said, (factor, offset, said)
+        else:
+            assert "section 5" not in said, said
 
 
 def test_contrast_transfers_that_no_view_can_show(refuse_series, stack, path):
@@ -457,6 +463,11 @@ def test_options_are_named_as_they_are_written(stack):
             (["export", stack, "--angpix", 5, "--bin", 2], "--angpix")):
         result = harness.tomofield(*arguments)
         assert result.returncode == 2 and says in result.stderr, (arguments, result.stderr)
+
+
+def test_an_option_without_its_value_takes_no_other_word(good, out, refuse, stack):
+    for option in ("--exclude=", "--thickness=", "--tlt="):
+        refuse([f"{option} has no value"], "reconstruct", stack, *good, option, "-o", out)
 
 
 def test_volumes_have_no_name_of_another_format(tmp_path):

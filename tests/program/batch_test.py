@@ -446,6 +446,27 @@ def test_no_file_is_written_twice_or_replaces_an_input(data):
     assert said.returncode == 2 and "the input" in said.stderr, said.stderr
 
 
+def test_its_configuration_is_an_input(data):
+    folder = harness.fresh_directory("configured")
+    for name in ("a.json", "summary.csv"):
+        config = pathlib.Path(folder, name)
+        config.write_text("", encoding="utf-8")
+        said = harness.tomofield("batch", *pattern(data), *QUICK, "-o", folder, "--overwrite",
+                                 "--config", config)
+        assert said.returncode == 2 and "which the command line is read from" in said.stderr, said
+        assert config.read_bytes() == b""
+        config.unlink()
+
+
+@pytest.mark.parametrize("name", ["summary.csv", "index.html"])
+def test_a_folder_in_the_place_of_its_own_file_is_found_first(data, name):
+    folder = harness.fresh_directory("folders")
+    os.makedirs(os.path.join(folder, name))
+    said = harness.tomofield("batch", *pattern(data), *QUICK, "-o", folder)
+    assert said.returncode == 2 and name in said.stderr and "is a folder" in said.stderr, said
+    assert os.listdir(folder) == [name]
+
+
 def test_a_tomogram_does_not_take_the_place_of_the_table_for_relion():
     folder = harness.fresh_directory("relion_name")
     star = star_projects.write_relion(folder, harness.Series("source"))

@@ -66,6 +66,9 @@ def test_the_coarse_stage_helps(command, psnr, whole):
 def test_leaves_too_small_have_no_coarse_stage(command):
     result = harness.succeed(*command(harness.fresh_results("small"), "--leaf-size", 16))
     assert "no coarse stage" in result.stderr and "--leaf-size" in result.stderr, result.stderr
+    result = harness.succeed(*command(harness.fresh_results("less"), "--leaf-size", 64,
+                                      "--coarse-bin", 64, "--dry-run"))
+    assert "at most 4 × 4 and not 64 × 64 (--coarse-bin)" in result.stderr, result.stderr
     result = harness.succeed(*command(harness.fresh_results("off"), "--coarse-epochs", 0))
     assert "no coarse stage" not in result.stderr, result.stderr
 

@@ -158,6 +158,14 @@ def test_a_disk_that_says_it_is_full_is_written_with_a_warning(library, series):
     assert told.same_as(series.reconstruct("truth"))
 
 
+@pytest.mark.parametrize("more", [[], ["--split-tilts"], ["--zarr"]])
+def test_too_small_a_disk_is_refused_before_the_work(library, series, tmp_path, more):
+    ended = harness.tomofield("reconstruct", *series.input, *QUICK, *more, "-o", tmp_path / "out.mrc",
+                              env=dict(os.environ, LD_PRELOAD=library, FAULT_FREE="8192"))
+    assert ended.returncode == 2 and "its disk has only" in ended.stderr, ended
+    assert "epoch" not in ended.stderr and os.listdir(tmp_path) == []
+
+
 def test_a_disk_that_says_it_has_room_ends_in_one_sentence(library, series, tmp_path):
     ended, left = on_small_disk(tmp_path, 64, {"LD_PRELOAD": library, "FAULT_FREE": str(1 << 50)},
                                 harness.PROGRAM, "reconstruct", *series.input, *QUICK, "-o", "out.mrc")

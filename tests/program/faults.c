@@ -1,7 +1,7 @@
 // A library for LD_PRELOAD that lets one call of the program fail, or kills the program there
 // (faults.py). The environment says which:
-//   FAULT_KIND    open, read, write, sync, close, rename, allocate, or io for all of these but the
-//                 last
+//   FAULT_KIND    open, read, write, sync, close, rename, stat, allocate, or io for all of these but
+//                 the last two
 //   FAULT_NUMBER  the call of this kind that fails, from 1; 0 only counts
 //   FAULT_MODE    once, from (this call and all that follow), or kill; once-done and from-done carry
 //                 out the renames and second names that they say have failed, as servers of NFS do
@@ -23,6 +23,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -61,7 +62,7 @@ __attribute__((destructor)) static void end(void) {
 
 // Counts a call, and says whether it has to fail.
 static int must_fail(const char* kind) {
-  const int is_io = strcmp(kind, "allocate") != 0;
+  const int is_io = strcmp(kind, "allocate") != 0 && strcmp(kind, "stat") != 0;
   if (strcmp(g_kind, kind) != 0 && !(is_io && strcmp(g_kind, "io") == 0)) return 0;
   const long count = atomic_fetch_add(&g_count, 1) + 1;
   if (g_number == 0 || count < g_number) return 0;
@@ -162,6 +163,16 @@ int close(int file) {
   }
 NAME_ANOTHER(rename)
 NAME_ANOTHER(link)
+
+#define LOOK_AT(name, type)                                  \
+  int name(const char* path, struct type* status) {          \
+    if (path_fails("stat", path)) FAIL(ESTALE, -1);          \
+    return NEXT(name)(path, status);                         \
+  }
+LOOK_AT(stat, stat)
+LOOK_AT(lstat, stat)
+LOOK_AT(stat64, stat64)
+LOOK_AT(lstat64, stat64)
 
 #define TELL_SPACE(name, type)                                                   \
   int name(const char* path, struct type* status) {                              \

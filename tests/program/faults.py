@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 
-KINDS = ("open", "read", "write", "sync", "close", "rename", "allocate")
+KINDS = ("open", "read", "write", "sync", "close", "rename", "stat", "allocate")
 # What a file server that is away or lost its files answers; its renames may be done all the same.
 SERVER = (("open", "once", errno.ESTALE), ("write", "once", errno.EIO), ("sync", "once", errno.EIO),
           ("sync", "from", errno.ESTALE), ("close", "once", errno.EIO), ("close", "from", errno.EIO),

@@ -2,6 +2,7 @@
 sentence, leaves old or new files, and is repeated with the same bits. `python3
 tests/program/faults.py` tries every call; these tests try some of each kind."""
 
+import errno
 import os
 
 import pytest
@@ -72,3 +73,30 @@ def test_a_full_disk_ends_in_one_sentence(sweep):
         for size in faults.disk_sizes(sweep, has_old_results, 3)[:2]:
             ended = faults.check_full_disk(sweep, size, has_old_results)
             assert ended.returncode == 2, (size, ended)
+
+
+def test_a_store_is_never_lost(sweep):
+    """A file that cannot be looked at is not absent."""
+    sweep.prepare(True)
+    folder = os.path.join(sweep.scratch, "store")
+    counted = os.path.join(sweep.scratch, "count")
+    command = ["export", sweep.results.model_path, "--zarr", "--overwrite", "-o",
+               os.path.join(folder, "out.mrc")]
+    os.makedirs(folder)
+    sweep.harness.succeed(*command)
+    before = sweep.harness.contents(folder)
+
+    def run(number, mode="once"):
+        fault = faults.Fault("stat", number, mode, errno.ESTALE)
+        return sweep.harness.tomofield(*command, timeout=60,
+                                       env=fault.environment(sweep.library, folder, counted))
+
+    assert run(0).returncode == 0
+    with open(counted, encoding="ascii") as file:
+        count = int(file.read())
+    assert count > 20
+    for number in range(1, count + 1, 2):
+        for mode in ("once", "from"):
+            ended = run(number, mode)
+            assert ended.returncode in (0, 2), (number, mode, ended)
+            assert set(before) <= set(sweep.harness.contents(folder)), (number, mode, ended)

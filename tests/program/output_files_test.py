@@ -275,6 +275,18 @@ def test_a_run_that_overwrites_another_keeps_volumes_and_records(series):
         assert read_bytes(os.path.join(folder, name)) == read_bytes(series.tlt)
 
 
+@pytest.mark.parametrize("ending", ["_fsc.png", "_prior.png", "_denoise.png", "_choice.png"])
+def test_an_input_called_like_a_picture_stays(series, ending):
+    folder = harness.fresh_directory("pictures" + ending)
+    tilts = os.path.join(folder, "out" + ending)
+    shutil.copy(series.tlt, tilts)
+    command = ["reconstruct", *harness.merge(series.input, ["--tlt", tilts]), *QUICK, "--overwrite",
+               "-o", os.path.join(folder, "out.mrc")]
+    refused(folder, ["input", tilts], command)
+    harness.succeed(*harness.merge(command, ["--tlt", series.tlt]))
+    assert read_bytes(tilts) == read_bytes(series.tlt), "it is no picture"
+
+
 def can_be_run_by_another_user():
     try:
         return harness.tomofield("--version", user=OTHER_USER).returncode == 0

@@ -250,6 +250,18 @@ def test_a_hand_that_is_none_is_refused(relion, hand):
         assert word in result.stderr, (word, result.stderr)
 
 
+def test_a_number_beyond_its_range_is_refused_with_its_file(relion):
+    path = relion.path("Tomograms/job009/voltage.star")
+    with open(relion.star, encoding="utf-8") as file:
+        text = file.read()
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text.replace("200.000000", "-1.000000"))
+    result = harness.tomofield("reconstruct", path, "--series", "TS_01", "--dry-run", cwd=relion.folder)
+    assert result.returncode == 2, result
+    for word in ("voltage.star", "rlnVoltage", "--voltage must be"):
+        assert word in result.stderr, (word, result.stderr)
+
+
 def test_one_series_has_no_name_to_choose(relion):
     views = relion.path("Tomograms/job009/tilt_series/TS_01.star")
     result = harness.tomofield("reconstruct", views, "--series", "TS_02", "-o", relion.path("no.mrc"),

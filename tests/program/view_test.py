@@ -172,6 +172,16 @@ def test_the_work_of_a_request_is_bounded(viewer):
             assert np.count_nonzero(np.isfinite(values)) <= 1, "one pixel is larger than all"
 
 
+def test_peers_that_take_no_answer_give_its_memory_back(viewer):
+    """Four planes of 64 MiB are all that it holds."""
+    plane = (f"GET {viewer.path}plane?volume=1&center=24,18,12&right=1,0,0&up=0,1,0&width=4096"
+             f"&height=4096&step=1e9 HTTP/1.1\r\nHost: 127.0.0.1:{viewer.port}\r\n\r\n")
+    with contextlib.ExitStack() as stack:
+        for _ in range(8):
+            stack.enter_context(connect(viewer, plane.encode()))
+        assert viewer.plane(4, 4)[0] == 200
+
+
 def test_ranges_are_not_served(viewer):
     query = urllib.parse.urlencode({"volume": 0, "center": "24,18,12.5", "right": X, "up": Y,
                                     "width": 64, "height": 64, "step": 0.1})

@@ -2,6 +2,8 @@
 
 import json
 import os
+import pathlib
+import shutil
 
 import harness
 import mrcfile
@@ -112,18 +114,43 @@ def test_a_store_into_which_others_put_something_stays(finished, version):
     refused = harness.tomofield(*command)
     assert refused.returncode == 2 and "'labels'" in refused.stderr, refused.stderr
     os.rmdir(path + ".zarr/labels")
-    for foreign in ("0/notes.txt", "0/0/notes.txt", "9/thesis.mrc", "0/labels/a"):
+    shutil.copytree(path + ".zarr", path + ".pristine")
+    chunks = "0/c" if version == "0.5" else "0"
+    other = "0/.zarray" if version == "0.5" else "0/zarr.json"
+    for foreign in ("0/notes.txt", "0/0/notes.txt", "9/thesis.mrc", "9/.zarray", "0/labels/a", other,
+                    f"{chunks}/0/0/99", f"{chunks}/99/0/0", f"{chunks}/0/0/00"):
         os.makedirs(os.path.dirname(f"{path}.zarr/{foreign}"), exist_ok=True)
         open(f"{path}.zarr/{foreign}", "w", encoding="utf-8").close()
         refused = harness.tomofield(*command)
         assert refused.returncode == 2 and "tomofield has not made" in refused.stderr, foreign
         assert os.path.isfile(f"{path}.zarr/{foreign}")
-        os.remove(f"{path}.zarr/{foreign}")
-        if foreign.split("/")[-2] in ("9", "labels"):
-            os.rmdir(os.path.dirname(f"{path}.zarr/{foreign}"))
+        shutil.rmtree(path + ".zarr")
+        shutil.copytree(path + ".pristine", path + ".zarr")
+    os.remove(f"{path}.zarr/{chunks}/0/0/0")
+    os.mkfifo(f"{path}.zarr/{chunks}/0/0/0")
+    assert "tomofield has not made" in harness.tomofield(*command).stderr
+    os.remove(f"{path}.zarr/{chunks}/0/0/0")
+    marker = pathlib.Path(f"{path}.zarr/.tomofield")
+    written = marker.read_bytes()
+    marker.write_bytes(b"")
+    refused = harness.tomofield(*command)
+    assert refused.returncode == 2 and "not as tomofield writes it" in refused.stderr, refused.stderr
+    marker.write_bytes(written)
     harness.succeed(*command)
     plain = [word for word in command if not word.startswith("--zarr") and word != version]
     assert "is not of the new" in harness.succeed(*plain).stderr
+
+
+def test_an_input_within_a_store_is_an_input(finished, tmp_path):
+    command = ["export", finished.model_path, "-o", tmp_path / "out.mrc", "--zarr", "--overwrite"]
+    harness.succeed(*command)
+    points = tmp_path / "out.zarr/0/0/0/0"
+    config = tmp_path / "link.txt"
+    config.symlink_to(points)
+    points.write_text("", "utf-8")
+    refused = harness.tomofield(*command, "--config", config)
+    assert refused.returncode == 2 and "the input" in refused.stderr, refused
+    assert points.read_bytes() == b""
 
 
 def test_a_store_is_replaced_beside_other_files_of_a_run_and_by_a_batch(tmp_path):

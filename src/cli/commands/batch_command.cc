@@ -75,7 +75,7 @@ batch::KnownColumns known_columns(const CLI::App& reconstruct) {
 
 // Reads which series there are. Adds the mistakes of a table to `faults`.
 std::vector<batch::Series> read_series(const CLI::App& program, const std::string& list,
-                                       batch::Faults& faults) {
+                                       base::Faults& faults) {
   const std::string ending = fs::path(list).extension().string();
   if (ending == ".star") return batch::read_star(list);
   if (ending != ".csv" && ending != ".tsv") return batch::expand_pattern(list);
@@ -230,10 +230,10 @@ void run(const CLI::App& command, const BatchArguments& arguments,
                              .skips_existing = arguments.skips_existing,
                              .overwrites = arguments.overwrites,
                              .stop_requested = stop_was_requested};
-  batch::Faults faults;
+  base::Faults faults;
   std::vector<batch::Series> series = read_series(*command.get_parent(), arguments.list, faults);
   settle_outputs(series, options, faults);
-  faults.require_none();
+  batch::require_none(faults);
   const io::OutputFolder folder(options.folder);
   const io::OutputLock lock(batch::list_of(options.folder));
   batch::JobList list = plan_jobs(series, options);

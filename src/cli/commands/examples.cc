@@ -13,7 +13,6 @@ namespace {
 
 // The words after the name of a command.
 constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
-    {"reconstruct", "TS_01/ -o TS_01.mrc   (the folder of an eTomo project)"},
     {"baseline", "tv TS_01/ -o TS_01_tv.mrc"},
     {"export", "TS_01.h5 --voxel-size 20 -o TS_01_20A.mrc"},
     {"view", "TS_01.h5"},

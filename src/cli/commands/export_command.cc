@@ -110,10 +110,10 @@ OrientedBox box_between_corners(const std::string& corners, double voxel_px) {
   for (std::size_t a = 0; a < 3; ++a) {
     const double voxels = (high[a] - low[a]) / voxel_px;
     if (voxels > 0 && voxels <= std::numeric_limits<std::int32_t>::max()) continue;
-    throw Error(fmt::format(
-        "--box has {} from {} to {}, {:.6g} voxels: give x0,y0,z0,x1,y1,z1 with the low corner "
-        "first",
-        "xyz"[a], low[a], high[a], voxels));
+    throw Error(fmt::format("--box has {} from {} to {}, {:.6g} voxels: {}", "xyz"[a], low[a],
+                            high[a], voxels,
+                            voxels > 0 ? "at most 2147483647 are allowed"
+                                       : "give x0,y0,z0,x1,y1,z1 with the low corner first"));
   }
   return field::box_between(low, high, voxel_px);
 }

@@ -98,6 +98,8 @@ void print_estimate(const plan::RunEstimate& estimate, int num_processes) {
     print("about {} of processor time, which is {} if nothing else runs on {}\n",
           base::time_text(*estimate.core_seconds),
           base::time_text(*estimate.core_seconds / threads), count_of(threads, "thread"));
+  } else {
+    print("the processor time of --engine ray and of leaves above 256 pixels is not known\n");
   }
   print("{:.2f} GiB of results, and at most {:.2f} GiB of disk while it runs\n",
         static_cast<double>(estimate.result_bytes) / kGibibyte,

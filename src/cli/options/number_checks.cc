@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <string>
+#include <system_error>
 
 #include "io/tables/text_lines.h"
 
@@ -48,8 +51,12 @@ CLI::Validator number_between(double low, double high) {
 
 CLI::Validator seed_check() {
   return {[](std::string& text) -> std::string {
-            const bool is_seed = !text.empty() && text.find_first_not_of("0123456789") == text.npos;
-            return is_seed ? "" : fmt::format("must be a whole number from 0, not {}", text);
+            std::uint64_t seed = 0;
+            const char* const end = text.data() + text.size();
+            const auto [next, fault] = std::from_chars(text.data(), end, seed);
+            const bool is_seed = fault == std::errc() && next == end;
+            return is_seed ? ""
+                           : fmt::format("must be a whole number from 0 to 2^64 - 1, not {}", text);
           },
           ""};
 }

@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "base/nearest_names.h"
+#include "cli/options/project_options.h"
 
 namespace tomofield::cli {
 namespace {
@@ -34,9 +35,7 @@ bool is_option(const std::string& word) {
 std::string fault_of_option(const CLI::App& command, const std::string& word) {
   const std::string name = word.substr(0, word.find('='));
   const std::vector<std::string> nearest = nearest_options(command, name);
-  const std::string sentence = fmt::format("there is no option {}", name);
-  if (nearest.empty()) return sentence;
-  return fmt::format("{} (did you mean {}?)", sentence, fmt::join(nearest, " or "));
+  return fmt::format("there is no option {}{}", name, base::did_you_mean(nearest));
 }
 
 // Returns a sentence on files beyond the one list that a command takes: those of a pattern that the
@@ -74,14 +73,10 @@ std::string fault_of_unknown_words(const CLI::App& command,
                      words.size() == 1 ? "belongs" : "belong");
 }
 
-// Returns a sentence if the stack does not exist, or an empty text.
-std::string fault_of_stack(const CLI::App& command) {
+// Returns a sentence if the stack of a command is not there, or an empty text.
+std::string fault_of_given_stack(const CLI::App& command) {
   const CLI::Option* stack = command.get_option_no_throw("stack");
-  if (stack == nullptr || stack->count() == 0) return {};
-  const std::string& path = stack->results().front();
-  std::error_code fault;
-  if (std::filesystem::exists(path, fault) || fault) return {};
-  return fmt::format("'{}' does not exist", path);
+  return stack == nullptr || stack->count() == 0 ? "" : fault_of_stack(stack->results().front());
 }
 
 // Returns the spellings of an option among the arguments, in their order.
@@ -133,7 +128,7 @@ std::string as_spelt(const CLI::App& command, const std::vector<std::string>& ar
 std::string parse_fault(const CLI::App& command, const std::vector<std::string>& arguments,
                         const CLI::ParseError& error) {
   if (std::string fault = fault_of_unknown_words(command, arguments); !fault.empty()) return fault;
-  if (std::string fault = fault_of_stack(command); !fault.empty()) return fault;
+  if (std::string fault = fault_of_given_stack(command); !fault.empty()) return fault;
   const bool is_count = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ArgumentMismatch);
   std::string repetition = is_count ? fault_of_repetition(command, arguments) : "";
   return repetition.empty() ? as_spelt(command, arguments, error.what()) : repetition;

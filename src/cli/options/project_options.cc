@@ -2,9 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <optional>
-#include <string>
 #include <string_view>
 #include <system_error>
 #include <vector>
@@ -13,7 +11,6 @@
 #include "cli/options/help_formatter.h"
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
-#include "io/saving/output_files.h"
 #include "option_table/setting.h"
 #include "option_table/values.h"
 #include "projects/project.h"
@@ -44,16 +41,6 @@ std::optional<projects::Project> read_project(const CLI::App& command,
        .has_transfer = choices.options.views.defocus_um || choices.files.ctf});
 }
 
-// Throws Error if the stack is not there. A half of a table of views, "even@TS_01.star", is no
-// file.
-void require_stack(const std::filesystem::path& stack) {
-  std::error_code fault;
-  const std::string text = stack.string();
-  const bool is_half = text.starts_with("even@") || text.starts_with("odd@");
-  if (!is_half && !std::filesystem::exists(stack, fault) && !fault)
-    throw Error(fmt::format("'{}' does not exist", stack.string()));
-}
-
 void print_setting(const Setting& setting, std::string_view remark) {
   print("{} {} from {}: {}{}\n", setting.option, setting.value, setting.file.string(),
         setting.entry, remark);
@@ -73,6 +60,14 @@ std::vector<Setting> settings_for(const CLI::App& command, const projects::Proje
 
 }  // namespace
 
+std::string fault_of_stack(const std::filesystem::path& stack) {
+  std::error_code fault;
+  const std::string text = stack.string();
+  const bool is_half = text.starts_with("even@") || text.starts_with("odd@");
+  if (is_half || std::filesystem::exists(stack, fault) || fault) return {};
+  return fmt::format("'{}' does not exist", text);
+}
+
 void add_project_options(CLI::App& command) {
   command
       .add_option_function<std::string>(
@@ -83,11 +78,11 @@ void add_project_options(CLI::App& command) {
 }
 
 void open_project(const CLI::App& command, option_table::Choices& choices) {
-  require_stack(choices.files.stack);
+  if (const std::string fault = fault_of_stack(choices.files.stack); !fault.empty())
+    throw Error(fault);
   choices.options.given = given_flags(command);
   const std::optional<projects::Project> project = read_project(command, choices);
   if (!project) return;
-  for (const auto& file : project->files()) io::add_input(file);
   option_table::apply_settings(settings_for(command, *project), choices);
   for (const Setting& setting : choices.options.settings) {
     print_setting(setting, setting.instead.empty()

@@ -1,10 +1,16 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
 
 #include "option_table/rows.h"
 
 namespace tomofield::cli {
+
+/// Returns a sentence if a stack is not there, or an empty text. A half of a table of views,
+/// "even@TS_01.star", is no file.
+std::string fault_of_stack(const std::filesystem::path& stack);
 
 /// Registers --series, which chooses one series of a project.
 void add_project_options(CLI::App& command);

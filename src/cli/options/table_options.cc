@@ -21,11 +21,8 @@ CLI::Option* add_flag(CLI::App& command, const Row& row, Choices& choices) {
       std::string(row.help));
 }
 
-// A project may state the thickness, so it is missed when that was opened (range_faults()).
-bool may_come_from_project(const Row& row) { return row.key == "specimen.thickness"; }
-
 std::string default_text(const Row& row, const Choices& choices) {
-  if (may_come_from_project(row)) return "that of a project, or required";
+  if (row.is_of_project) return "that of a project, or required";
   if (!row.automatic.empty()) return std::string(row.automatic);
   return option_table::text_of(row, choices).value_or("");
 }
@@ -55,7 +52,8 @@ CLI::Option* add_row(CLI::App& command, const Row& row, Choices& choices) {
                                                    : add_value(command, row, choices);
   // CLI11 lists positional arguments apart.
   if (row.group != Group::kSeries) option->group(std::string(option_table::title_of(row.group)));
-  return option->required(row.is_required && !may_come_from_project(row));
+  // What a project may state is missed once that was opened (range_faults()).
+  return option->required(row.is_required && !row.is_of_project);
 }
 
 CLI::Option* add_row(CLI::App& command, std::string_view key, Choices& choices,

@@ -138,6 +138,12 @@ Point OrientedBox::position(const Point& voxel) const {
   return at;
 }
 
+namespace {
+
+constexpr double kMostSide = std::numeric_limits<std::int32_t>::max();  // voxels along an axis
+
+}  // namespace
+
 OrientedBox box_between(const Point& low, const Point& high, double voxel_px) {
   // Sizes that are whole but for rounding count as whole.
   constexpr double kRounding = 1e-6;
@@ -145,8 +151,13 @@ OrientedBox box_between(const Point& low, const Point& high, double voxel_px) {
   box.voxel_px = voxel_px;
   for (std::size_t a = 0; a < 3; ++a) {
     box.centre_px[a] = (low[a] + high[a]) / 2;
-    box.size[a] = std::max<std::int64_t>(
-        1, static_cast<std::int64_t>(std::floor((high[a] - low[a]) / voxel_px + kRounding)));
+    const double voxels = std::floor((high[a] - low[a]) / voxel_px + kRounding);
+    if (!(voxels <= kMostSide))
+      throw Error(
+          fmt::format("voxels of {:g} px are too small: there would be {:.2g} along an axis, and "
+                      "at most {:.0f} are allowed",
+                      voxel_px, voxels, kMostSide));
+    box.size[a] = std::max<std::int64_t>(1, static_cast<std::int64_t>(voxels));
   }
   return box;
 }
@@ -159,7 +170,6 @@ double num_points(const OrientedBox& box) {
 
 void require_feasible(const OrientedBox& box) {
   constexpr double kMostPoints = 1e13;  // hours to days of a machine
-  constexpr double kMostSide = std::numeric_limits<std::int32_t>::max();
   const double points = num_points(box);
   const auto side = static_cast<double>(*std::ranges::max_element(box.size));
   if (points <= kMostPoints && side <= kMostSide) return;

@@ -37,7 +37,7 @@ struct OrientedBox {
 };
 
 /// Returns the box with corners `low` and `high`, about the same centre, as far as whole voxels
-/// fill it (at least one).
+/// fill it (at least one). Throws Error for voxels of which 2³¹ or more would fill a side.
 OrientedBox box_between(const Point& low, const Point& high, double voxel_px);
 
 /// Returns the number of points in all voxels of a box.

@@ -151,6 +151,8 @@ TEST(SampleBox, BoxesFillTheirCornersWithWholeVoxels) {
   EXPECT_EQ(box_between({0, 0, 0}, {3, 3, 0.3}, 0.1).size,
             (std::array<std::int64_t, 3>{30, 30, 3}));
   EXPECT_EQ(box_between({0, 0, 0}, {3, 3, 3}, 5).size, (std::array<std::int64_t, 3>{1, 1, 1}));
+  for (const double tiny : {1e-9, 1e-30, 1e-300})
+    EXPECT_THROW(box_between({0, 0, 0}, {3, 3, 3}, tiny), Error);
 }
 
 TEST(SampleBox, BoxesThatNoMachineSamplesAreRefused) {

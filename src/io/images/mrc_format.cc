@@ -227,16 +227,6 @@ MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name
   return header;
 }
 
-std::optional<std::array<double, 3>> stated_voxel_size_A(const MrcHeaderBytes& bytes,
-                                                         const MrcHeader& header) {
-  const Fields fields(bytes, header.is_byte_swapped);
-  const bool is_its = fields.int32(kSize) == header.nx && fields.int32(kSize + 4) == header.ny &&
-                      fields.int32(kSize + 8) == header.nz &&
-                      fields.int32(kMode) == static_cast<std::int32_t>(header.mode);
-  if (!is_its) return std::nullopt;
-  return std::array{stated_size_A(fields, 0), stated_size_A(fields, 1), stated_size_A(fields, 2)};
-}
-
 std::int64_t expected_file_bytes(const MrcHeader& header, const std::string& name) {
   const base::CheckedSize values = base::CheckedSize(header.nx) * header.ny * header.nz;
   const auto bytes =
@@ -386,10 +376,14 @@ std::optional<MrcFacts> find_mrc_facts(const std::filesystem::path& path, const 
   if (beyond < 0) return std::nullopt;
   MrcHeaderBytes bytes;
   file.read_at(0, bytes.data(), bytes.size());
-  const auto voxel_size_A = stated_voxel_size_A(bytes, header);
-  if (!voxel_size_A) return std::nullopt;
+  const Fields fields(bytes, header.is_byte_swapped);
+  const bool is_its = fields.int32(kSize) == header.nx && fields.int32(kSize + 4) == header.ny &&
+                      fields.int32(kSize + 8) == header.nz &&
+                      fields.int32(kMode) == static_cast<std::int32_t>(header.mode);
+  if (!is_its) return std::nullopt;
   const auto width = static_cast<std::int64_t>(bytes_per_value(header.mode));
-  return MrcFacts{*voxel_size_A, beyond / (header.nx * header.ny * width)};
+  return MrcFacts{{stated_size_A(fields, 0), stated_size_A(fields, 1), stated_size_A(fields, 2)},
+                  beyond / (header.nx * header.ny * width)};
 }
 
 }  // namespace tomofield::io

@@ -34,11 +34,6 @@ MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name
 /// Returns the bytes that a file with this header has. Throws Error if 63 bits cannot hold them.
 std::int64_t expected_file_bytes(const MrcHeader& header, const std::string& name);
 
-/// Returns the sides of a voxel as a file states them, whether or not they can be: cell lengths
-/// over numbers of samples, 0 without samples. Returns nothing if the bytes are of another header.
-std::optional<std::array<double, 3>> stated_voxel_size_A(const MrcHeaderBytes& bytes,
-                                                         const MrcHeader& header);
-
 /// Returns the fixed header of a new file, little-endian, without an extended one.
 MrcHeaderBytes encode_mrc_header(const MrcHeader& header);
 
@@ -81,10 +76,11 @@ inline std::uint16_t half_from_float(float value) {
   return sign | static_cast<std::uint16_t>((bits + ties_to_even - (112u << 23)) >> 13);
 }
 
-/// What an MRC file has and its MrcHeader does not say.
+/// Holds what MrcHeader leaves out of an MRC file: values that cannot be, and trailing bytes.
 struct MrcFacts {
-  std::array<double, 3> voxel_size_A{};  ///< as the header states it, even if it cannot be
-  std::int64_t sections_beyond = 0;      ///< whole sections after the last one that it states
+  /// Cell lengths over numbers of samples, as the file states them; 0 without samples.
+  std::array<double, 3> voxel_size_A{};
+  std::int64_t sections_beyond = 0;  ///< whole sections after the last one that it states
 };
 
 /// Returns the facts of a file that was read with this header. Returns nothing if it is no MRC file

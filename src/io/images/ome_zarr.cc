@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
-#include <system_error>
 #include <vector>
 
 #include "base/progress.h"
 #include "io/images/mrc.h"
 #include "io/images/mrc_format.h"
 #include "io/images/zarr_array.h"
-#include "io/is_file.h"
+#include "io/images/zarr_store.h"
 #include "io/saving/atomic_folder.h"
 #include "io/saving/positioned_file.h"
 #include "tomofield/error.h"
@@ -149,31 +148,6 @@ void write_group(const std::filesystem::path& root, nlohmann::json scales, ZarrV
   write_text(root / ".zgroup", {{"zarr_format", 2}});
 }
 
-bool is_number(const std::string& name) {
-  return std::ranges::all_of(name, [](char c) { return c >= '0' && c <= '9'; });
-}
-
-// Says whether write_ome_zarr() gives this name to a file at a depth of a store: the group is
-// described at the top, a level at depth 1, and chunks are numbers.
-bool is_own_file(const std::string& name, int depth) {
-  constexpr std::array<const char*, 4> kOfGroup{kZarrMarker, ".zattrs", ".zgroup", "zarr.json"};
-  constexpr std::array<const char*, 2> kOfLevel{".zarray", "zarr.json"};
-  if (depth == 0) return std::ranges::find(kOfGroup, name) != kOfGroup.end();
-  if (depth == 1) return std::ranges::find(kOfLevel, name) != kOfLevel.end();
-  return is_number(name);
-}
-
-// Says the same for a folder: levels, and the folders of their chunks, which are numbers or lie in
-// "c".
-bool is_own_folder(const std::string& name, int depth) {
-  return is_number(name) || (depth == 1 && name == "c");
-}
-
-// Says whether a folder of the top is a level: it has the description of an array.
-bool is_level(const std::filesystem::path& folder) {
-  return is_file(folder / ".zarray") || is_file(folder / "zarr.json");
-}
-
 }  // namespace
 
 base::CheckedSize ome_zarr_bytes(Size size, MrcMode mode) {
@@ -185,28 +159,6 @@ base::CheckedSize ome_zarr_bytes(Size size, MrcMode mode) {
     bytes = bytes + of_level;
     if (std::ranges::max(size) <= ZarrArray::kSide) return bytes;
   }
-}
-
-void require_replaceable_zarr(const std::filesystem::path& path) {
-  require_replaceable_folder(path, kZarrMarker);
-  std::error_code absent;
-  std::filesystem::recursive_directory_iterator entries(path, absent), end;
-  for (; !absent && entries != end; entries.increment(absent)) {
-    const bool is_folder = entries->is_directory() && !entries->is_symlink();
-    const std::string name = entries->path().filename().string();
-    const int depth = entries.depth();
-    const bool is_own = is_folder
-                            ? is_own_folder(name, depth) && (depth > 0 || is_level(entries->path()))
-                            : !entries->is_symlink() && is_own_file(name, depth);
-    if (is_own) continue;
-    throw Error(
-        fmt::format("cannot replace '{}': it has '{}', which tomofield has not made; move one of "
-                    "them away, or give another name",
-                    path.string(), entries->path().lexically_relative(path).string()));
-  }
-  if (absent && std::filesystem::exists(path))
-    throw Error(fmt::format("cannot replace '{}': it cannot be looked through ({})", path.string(),
-                            absent.message()));
 }
 
 void write_ome_zarr(const std::filesystem::path& mrc, const std::filesystem::path& zarr,

@@ -11,18 +11,9 @@
 
 namespace tomofield::io {
 
-/// The file by which a folder is known as a store that this program made; only such a folder is
-/// replaced.
-inline constexpr const char* kZarrMarker = ".tomofield";
-
 /// Returns the bytes of the arrays of a store: whole chunks, also where a volume ends in one.
 /// `size` is (x, y, z).
 base::CheckedSize ome_zarr_bytes(std::array<std::int64_t, 3> size, MrcMode mode);
-
-/// Throws Error if something is at `path` that write_ome_zarr() must not replace: anything but a
-/// store that this program made, or such a store with something that others put into it, such as
-/// labels.
-void require_replaceable_zarr(const std::filesystem::path& path);
 
 /// Writes an MRC volume as OME-Zarr (https://ngff.openmicroscopy.org/): axes z, y, x in Å, the
 /// volume itself in the array "0", and in "1", "2", … the means of 2 × 2 × 2 voxels of the array

@@ -4,6 +4,7 @@
 #include <png.h>
 
 #include "base/check.h"
+#include "io/is_file.h"
 #include "io/saving/atomic_file.h"
 #include "tomofield/error.h"
 
@@ -39,6 +40,15 @@ void write_png_grey(const std::filesystem::path& path, std::int64_t width, std::
 void write_png_rgb(const std::filesystem::path& path, std::int64_t width, std::int64_t height,
                    std::span<const std::uint8_t> pixels) {
   write_png(path, width, height, PNG_FORMAT_RGB, pixels);
+}
+
+bool is_png(const std::filesystem::path& path) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  const bool is_picture =
+      is_file(path) && png_image_begin_read_from_file(&image, path.c_str()) != 0;
+  png_image_free(&image);
+  return is_picture;
 }
 
 RgbImage read_png(const std::filesystem::path& path) {

@@ -22,6 +22,9 @@ struct RgbImage {
   std::vector<std::uint8_t> pixels;
 };
 
+/// Says whether there is a picture of this format at a path.
+bool is_png(const std::filesystem::path& path);
+
 /// Reads a picture that this program wrote. Throws Error if it cannot be read.
 RgbImage read_png(const std::filesystem::path& path);
 

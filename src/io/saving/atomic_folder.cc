@@ -14,8 +14,7 @@ namespace tomofield::io {
 namespace fs = std::filesystem;
 
 void require_replaceable_folder(const fs::path& path, const fs::path& marker) {
-  std::error_code absent;
-  const fs::file_status status = fs::symlink_status(path, absent);
+  const fs::file_status status = type_at(path);
   if (!fs::exists(status)) return;
   if (fs::is_symlink(status)) {
     throw Error(
@@ -23,7 +22,7 @@ void require_replaceable_folder(const fs::path& path, const fs::path& marker) {
                     "replaced; give the name that it points to, or move it away",
                     path.string()));
   }
-  if (fs::is_directory(status) && fs::is_regular_file(path / marker, absent)) return;
+  if (fs::is_directory(status) && fs::is_regular_file(type_at(path / marker))) return;
   throw Error(
       fmt::format("cannot replace '{}': it is no folder of such results (it has no '{}'); "
                   "move it away, or give another name",

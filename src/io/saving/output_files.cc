@@ -4,6 +4,8 @@
 
 #include <cctype>
 #include <map>
+#include <system_error>
+#include <utility>
 
 #include "io/saving/file_identity.h"
 #include "io/saving/output_target.h"
@@ -19,6 +21,18 @@ std::vector<fs::path>& other_inputs() {
   return files;
 }
 
+// Adds an input with the folders that it lies in: a store that is replaced takes all of itself
+// away.
+void add_with_folders(const fs::path& file, std::map<FileIdentity, fs::path>& read) {
+  read.emplace(identity_of(file), file);
+  std::error_code failed;
+  fs::path inside = fs::weakly_canonical(end_of_links(file), failed);
+  while (inside.has_relative_path()) {
+    inside = inside.parent_path();
+    read.emplace(identity_of(inside), file);
+  }
+}
+
 }  // namespace
 
 void add_input(const fs::path& file) { other_inputs().push_back(file); }
@@ -28,8 +42,8 @@ const std::vector<fs::path>& added_inputs() { return other_inputs(); }
 void require_no_input_is_replaced(const std::vector<fs::path>& results,
                                   const std::vector<fs::path>& inputs) {
   std::map<FileIdentity, fs::path> read;
-  for (const fs::path& file : inputs) read.emplace(identity_of(file), file);
-  for (const fs::path& file : other_inputs()) read.emplace(identity_of(file), file);
+  for (const auto* files : {&inputs, &std::as_const(other_inputs())})
+    for (const fs::path& file : *files) add_with_folders(file, read);
   for (const fs::path& result : results) {
     const auto input = read.find(identity_of(result));
     if (input == read.end()) continue;

@@ -15,7 +15,8 @@ void add_input(const std::filesystem::path& file);
 /// Returns the files of add_input().
 const std::vector<std::filesystem::path>& added_inputs();
 
-/// Throws Error if a result would replace one of the `inputs` or of add_input().
+/// Throws Error if a result, a file or a folder, would replace one of the `inputs` or of
+/// add_input().
 void require_no_input_is_replaced(const std::vector<std::filesystem::path>& results,
                                   const std::vector<std::filesystem::path>& inputs);
 

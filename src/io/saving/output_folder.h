@@ -19,16 +19,18 @@ class OutputFolder {
   std::filesystem::path first_made_;  // empty: all were there
 };
 
-/// A directory for small files of one command, in its folder of results, which is locked. The
-/// destructor removes it with all its contents.
+/// A directory for what a child process plans and says, in a folder of results, which is locked.
+/// The destructor removes these two files and the directory. It leaves files of others.
 class ScratchFolder {
  public:
-  /// Removes what a killed command left. Throws Error if `folder` cannot be written.
+  /// Removes what a killed command left. Throws Error if `folder` cannot be written, or if others
+  /// have put files into the directory.
   ScratchFolder(const std::filesystem::path& folder, const char* name);
   ~ScratchFolder();
   ScratchFolder(const ScratchFolder&) = delete;
   ScratchFolder& operator=(const ScratchFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path plan() const;
+  std::filesystem::path log() const;
 
  private:
   std::filesystem::path path_;

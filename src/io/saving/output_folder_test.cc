@@ -39,5 +39,30 @@ TEST(OutputFolder, RefusesWhatIsNoFolder) {
   EXPECT_THROW(OutputFolder{file / "folder"}, Error);
 }
 
+TEST(ScratchFolder, LeavesNothing) {
+  const ScratchDirectory scratch;
+  scratch.write(".plans/.plan.json.tomofield-lock", "of a killed command");
+  {
+    const ScratchFolder made(scratch.path(), ".plans");
+    EXPECT_TRUE(fs::is_empty(scratch / ".plans"));
+    scratch.write(".plans/plan.json", "{}");
+    scratch.write(".plans/log", "text");
+  }
+  EXPECT_TRUE(fs::is_empty(scratch.path()));
+}
+
+TEST(ScratchFolder, KeepsFilesOfOthers) {
+  const ScratchDirectory scratch;
+  {
+    const ScratchFolder made(scratch.path(), ".plans");
+    scratch.write(".plans/notes.txt", "text");
+  }
+  EXPECT_TRUE(fs::exists(scratch / ".plans/notes.txt"));
+  EXPECT_THROW(ScratchFolder(scratch.path(), ".plans"), Error);
+  EXPECT_TRUE(fs::exists(scratch / ".plans/notes.txt"));
+  scratch.write(".file", "text");
+  EXPECT_THROW(ScratchFolder(scratch.path(), ".file"), Error);
+}
+
 }  // namespace
 }  // namespace tomofield::io

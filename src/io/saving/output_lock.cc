@@ -76,6 +76,13 @@ bool is_still_there(const fs::path& file, int descriptor) {
          by_name.st_ino == opened.st_ino && by_name.st_dev == opened.st_dev;
 }
 
+[[noreturn]] void throw_lost(const fs::path& target, const fs::path& lock) {
+  throw Error(fmt::format(
+      "cannot write '{}': its lock '{}' cannot be found again after it is made; look at "
+      "the file system of this folder, or write to another one",
+      target.string(), lock.string()));
+}
+
 [[noreturn]] void throw_held(const fs::path& target, const std::string& holder) {
   throw Error(
       fmt::format("another run writes '{}' now ({}): wait until it has ended, or give another name",
@@ -122,8 +129,9 @@ void sign(const Held& held) {
 }
 
 void take(const fs::path& target, Held& held) {
-  while (!try_lock(target, held)) {
-  }
+  constexpr int kMostTries = 100;  // other processes make and remove their locks meanwhile
+  for (int tries = 1; !try_lock(target, held); ++tries)
+    if (tries == kMostTries) throw_lost(target, held.file);
   if (held.descriptor < 0) return;
   sign(held);
   remove_abandoned(target);

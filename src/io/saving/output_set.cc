@@ -67,13 +67,13 @@ struct OutputSet::Change {
   fs::path old;  // empty: there was none
   bool is_removal = false;
   bool is_folder = false;
+  bool is_made = false;  // the new file or folder has the name
 
   // Keeps the file that is there under another name: as a second name where the file system has
   // that, so that the first is never missing.
   static Change begin(const fs::path& target, bool is_removal) {
-    Change change{target, {}, is_removal, false};
-    std::error_code absent;
-    const fs::file_status status = fs::symlink_status(target, absent);
+    Change change{target, {}, is_removal, false, false};
+    const fs::file_status status = type_at(target);
     if (!fs::exists(status)) return change;
     errno = EISDIR;
     if (fs::is_directory(status)) throw_cannot_replace(target);
@@ -85,9 +85,8 @@ struct OutputSet::Change {
 
   // Keeps the folder that is there under another name.
   static Change begin_folder(const fs::path& target) {
-    Change change{target, {}, false, true};
-    std::error_code absent;
-    if (!fs::exists(fs::symlink_status(target, absent))) return change;
+    Change change{target, {}, false, true, false};
+    if (!fs::exists(type_at(target))) return change;
     change.old = unused_temporary_name(target);
     if (!rename_file(target, change.old)) throw_cannot_replace(target);
     return change;
@@ -95,19 +94,26 @@ struct OutputSet::Change {
 
   // Removes what was replaced.
   void forget_old() const {
-    std::error_code ignored;
-    if (is_folder && !old.empty()) fs::remove_all(old, ignored);
-    if (!is_folder && !old.empty()) ::unlink(old.c_str());
+    if (old.empty()) return;
+    std::error_code failed;
+    if (is_folder)
+      fs::remove_all(old, failed);
+    else
+      fs::remove(old, failed);
+    if (failed)
+      base::log_warning(fmt::format("'{}', which is replaced, cannot be removed: {}", old.string(),
+                                    failed.message()));
   }
 
   // Gives back the old file or folder. Returns false if that is not possible.
   bool undo() const {
+    if (old.empty() && !is_made) return true;
     if (is_folder) {
       std::error_code failed;
-      fs::remove_all(target, failed);
+      if (is_made) fs::remove_all(target, failed);
       return !failed && (old.empty() || rename_file(old, target));
     }
-    if (old.empty()) return is_removal || ::unlink(target.c_str()) == 0 || errno == ENOENT;
+    if (old.empty()) return ::unlink(target.c_str()) == 0 || errno == ENOENT;
     std::error_code absent;
     if (fs::equivalent(old, target, absent)) return ::unlink(old.c_str()) == 0;
     return rename_file(old, target);
@@ -152,10 +158,12 @@ void OutputSet::make_changes(std::vector<Change>& changes) const {
   for (const AtomicFile& file : files_) {
     changes.push_back(Change::begin(file.target_, false));
     if (!rename_file(file.temporary_path_, file.target_)) throw_cannot_replace(file.path_);
+    changes.back().is_made = true;
   }
   for (const AtomicFolder& folder : folders_) {
     changes.push_back(Change::begin_folder(folder.path_));
     if (!rename_file(folder.temporary_path_, folder.path_)) throw_cannot_replace(folder.path_);
+    changes.back().is_made = true;
   }
 }
 

@@ -74,6 +74,14 @@ fs::path output_target(const fs::path& path) {
   return target;
 }
 
+fs::file_status type_at(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(path, error);
+  if (fs::status_known(status)) return status;
+  throw Error(fmt::format("cannot write '{}': what is there now cannot be looked at: {}",
+                          path.string(), error.message()));
+}
+
 fs::path folder_of(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
@@ -115,10 +123,10 @@ void require_room(const fs::path& folder, const fs::path& path, std::int64_t byt
   if (error || space.available >= static_cast<std::uintmax_t>(bytes)) return;
   if (space.available == 0) {
     return base::log_warning(
-        fmt::format("'{}' will have {} bytes, but its disk has only 0 left", path.string(), bytes));
+        fmt::format("'{}' needs {} bytes, but its disk has only 0 left", path.string(), bytes));
   }
   throw Error(fmt::format(
-      "cannot write '{}': it will have {} bytes ({:.4g} GiB), and its disk has only {:.4g} GiB "
+      "cannot write '{}': it needs {} bytes ({:.4g} GiB), and its disk has only {:.4g} GiB "
       "left: free some space there, write to another folder, or make a smaller volume",
       path.string(), bytes, static_cast<double>(bytes) / kGibibyte,
       static_cast<double>(space.available) / kGibibyte));

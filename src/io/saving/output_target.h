@@ -12,6 +12,10 @@ namespace tomofield::io {
 /// folder).
 std::filesystem::path output_target(const std::filesystem::path& path);
 
+/// Returns what is at `path`, which may be a link itself. Throws Error if the system fails to say:
+/// a file that cannot be looked at is not absent.
+std::filesystem::file_status type_at(const std::filesystem::path& path);
+
 /// Returns the folder of a file: "." for a mere name.
 std::filesystem::path folder_of(const std::filesystem::path& file);
 

@@ -49,9 +49,9 @@ void require_one_hand(const std::filesystem::path& path, const std::vector<TextL
 }
 
 constexpr std::string_view kForm =
-    "a tilt angle, alone, or with its place in the order of recording and its dose, as in AreTomo "
-    "3's "
-    "_TLT.txt; of any others keep one column, the tilt angles in degrees from -360 to 360";
+    "a tilt angle, alone, or with its place in the order of recording and its dose, 0 to 10000 "
+    "electrons per Å², as in AreTomo 3's _TLT.txt; of any others keep one column, the tilt angles "
+    "in degrees from -360 to 360";
 
 }  // namespace
 
@@ -87,7 +87,7 @@ TiltTable read_tilt_table(const std::filesystem::path& path) {
     const bool has_columns = words.size() == num_columns;
     const auto tilt = has_columns ? parse_number(words[0], base::kLargestAngle_deg) : std::nullopt;
     const auto number = has_columns ? parse_integer(words[1]) : std::nullopt;
-    const auto dose = has_columns ? parse_number(words.back()) : std::nullopt;
+    const auto dose = has_columns ? parse_number(words.back(), {0.0, kLargestDose}) : std::nullopt;
     if (!tilt || !number || !dose || !recorded.emplace(*number, table.angles.size()).second)
       throw_line_error(path, line, kForm);
     table.angles.push_back({*tilt, line.number});

@@ -354,8 +354,9 @@ TEST(TiltTable, ReadsTheColumnsOfAreTomo3) {
   EXPECT_EQ(two.order, (std::vector<std::size_t>{1, 0}));
   EXPECT_TRUE(two.doses.empty());
   EXPECT_TRUE(read_tilt_table(scratch.write("a.tlt", "-6\n0\n")).order.empty());
-  for (const char* bad : {"1 2\n3 4\n", "1 1\n3 1\n", "0 0.5\n1 1\n", "1 1 2\n1 2\n",
-                          "1 1 x\n2 2 1\n", "1 2 3 4\n2 3 4 5\n"})
+  for (const char* bad :
+       {"1 2\n3 4\n", "1 1\n3 1\n", "0 0.5\n1 1\n", "1 1 2\n1 2\n", "1 1 x\n2 2 1\n",
+        "1 1 -3\n2 2 3\n", "1 1 3\n2 2 1e5\n", "1 2 3 4\n2 3 4 5\n"})
     expect_parts(message_of<Error>([&] { read_tilt_table(scratch.write("bad.tlt", bad)); }),
                  {"bad.tlt", "line "});
 }

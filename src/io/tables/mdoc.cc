@@ -170,7 +170,7 @@ std::optional<std::int64_t> parse_time(std::string_view text) {
 // Returns the dose that an entry says, which must be a number of 0 or more.
 double require_dose(const std::filesystem::path& path, const TextLine& line,
                     const KeyValue& entry) {
-  const double dose = require_number(path, line, entry.value, base::kLargestNumber);
+  const double dose = require_number(path, line, entry.value, kLargestDose);
   if (dose >= 0.0) return dose;
   throw Error(fmt::format("'{}', line {}: {} is {}, and a dose cannot be negative", path.string(),
                           line.number, entry.key, dose));

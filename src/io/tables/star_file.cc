@@ -167,7 +167,6 @@ std::optional<double> StarRow::find_stated_number(std::string_view column, doubl
 }
 
 std::optional<double> StarRow::find_dose(std::string_view column) const {
-  constexpr double kLargestDose = 1e6;
   const auto dose = find_stated_number(column, kLargestDose);
   if (!dose || *dose >= 0.0) return dose;
   throw Error(fmt::format("{}: the dose {} in the column _{} is negative", where(), *dose, column));

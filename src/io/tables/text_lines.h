@@ -32,6 +32,9 @@ std::vector<TextLine> read_text_lines(const std::filesystem::path& path);
 std::string_view trim(std::string_view text);
 std::vector<std::string_view> split_words(std::string_view text);
 
+/// The largest exposure of a specimen in electrons per Å²: 100 times what a tilt series has.
+inline constexpr double kLargestDose = 1e4;
+
 /// Parses a whole word as a number within an interval. Returns nothing if the word is another
 /// number or none, or if any character is left over. All readers of text files get their numbers
 /// from here.

@@ -190,6 +190,21 @@ TEST(ViewTable, ReadsTheXmlOfWarp) {
   EXPECT_EQ(table.defocus_hand, 1);
 }
 
+TEST(ViewTable, NamesPixelsOfWarpThatAreNotSquare) {
+  const ScratchDirectory scratch;
+  const auto with = [&](const std::string& parameters) {
+    return scratch.write("TS.xml", kSeriesXml + "<CTF>" + parameters + "</CTF></TiltSeries>");
+  };
+  const ViewTable table = read_view_table(
+      with("<Param Name=\"PixelSize\" Value=\"10\"/><Param Name=\"PixelSizeDelta\" Value=\"2\"/>"));
+  ASSERT_EQ(table.not_applied.size(), 1u);
+  expect_parts(table.not_applied[0], {"PixelSizeDelta", "not square"});
+  for (const char* size : {"-1", "0", "nan", "abc"})
+    expect_parts(
+        refusal_of_views(with("<Param Name=\"PixelSize\" Value=\"" + std::string(size) + "\"/>")),
+        {"TS.xml", "PixelSize"});
+}
+
 TEST(ViewTable, RefusesADoseBelowZero) {
   const ScratchDirectory scratch;
   expect_parts(refusal_of_views(scratch.write(

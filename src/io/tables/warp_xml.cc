@@ -1,7 +1,7 @@
 #include <fmt/format.h>
+#include <strings.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <optional>
 #include <pugixml.hpp>
@@ -66,10 +66,9 @@ class WarpXml {
 
   // Parses a flag, in upper or lower case.
   bool parse_flag(std::string_view text, std::string_view what) const {
-    std::string word(text);
-    std::ranges::transform(word, word.begin(),
-                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    if (word == "true" || word == "false") return word == "true";
+    const std::string word(text);
+    const bool is_true = strcasecmp(word.c_str(), "true") == 0;
+    if (is_true || strcasecmp(word.c_str(), "false") == 0) return is_true;
     throw Error(fmt::format("'{}': '{}' in {} is neither True nor False: correct it",
                             path_.string(), quote(text), what));
   }
@@ -263,6 +262,17 @@ void set_defocus(const WarpXml& xml, ViewTable& table) {
   }
 }
 
+// The size of pixels is that of the images. One that is stated here must be possible, and square.
+void check_pixels(const WarpXml& xml, ViewTable& table) {
+  const auto size_A = xml.ctf_parameter("PixelSize");
+  if (size_A && !base::is_plausible_pixel_size(*size_A))
+    throw Error(
+        fmt::format("'{}': a PixelSize of {} Å is none: correct it", table.file.string(), *size_A));
+  for (const char* name : {"PixelSizeDelta", "PixelSizeDeltaPercent"})
+    if (xml.ctf_parameter(name).value_or(0.0) != 0.0)
+      table.not_applied.emplace_back(fmt::format("{}, pixels that are not square", name));
+}
+
 }  // namespace
 
 // The geometry is that of read_warp_tomostar(). LevelAngleX turns the specimen about x before it is
@@ -274,7 +284,7 @@ ViewTable read_warp_xml(const std::filesystem::path& path) {
   const auto axes = xml.numbers("AxisAngle", num_views, base::kLargestAngle_deg);
   const auto offsets_x = xml.numbers("AxisOffsetX", num_views, base::kLargestPosition_px);
   const auto offsets_y = xml.numbers("AxisOffsetY", num_views, base::kLargestPosition_px);
-  const auto doses = xml.numbers("Dose", num_views, base::kLargestNumber);
+  const auto doses = xml.numbers("Dose", num_views, kLargestDose);
   const auto movies = xml.lines("MoviePath");
   const auto flags = xml.lines("UseTilt");
   xml.require_count("MoviePath", movies.size(), num_views);
@@ -307,6 +317,7 @@ ViewTable read_warp_xml(const std::filesystem::path& path) {
   table.optics = {xml.ctf_parameter("Voltage"), xml.ctf_parameter("Cs"),
                   xml.ctf_parameter("Amplitude")};
   table.defocus_hand = xml.defocus_hand();
+  check_pixels(xml, table);
   for (const char* grid : {"GridVolumeWarpX", "GridVolumeWarpY", "GridVolumeWarpZ"})
     if (!xml.is_zero(grid))
       table.not_applied.emplace_back(fmt::format("{}, a deformation of the specimen", grid));

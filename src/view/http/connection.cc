@@ -20,6 +20,7 @@ using std::chrono_literals::operator""s;
 constexpr auto kLongestIdle = 60s;
 constexpr auto kLongestHead = 5s;
 constexpr auto kLongestDrain = 1s;
+constexpr auto kLongestPause = 1s;  // of a peer that takes an answer, if others need its memory
 constexpr std::size_t kSlowestRate = 256 << 10;  // bytes of an answer a second, after 10 s
 
 // These tell a browser to keep nothing, and let the page load nothing from elsewhere.
@@ -92,6 +93,10 @@ void Connection::advance() {
   }
 }
 
+bool Connection::is_stuck(Clock::time_point now) const {
+  return state_ == State::kWriting && now - last_sent_ > kLongestPause;
+}
+
 void Connection::check_time(Clock::time_point now) {
   const auto is_over = [&](auto longest) { return now - since_ > longest; };
   const auto longest_write = 10s + std::chrono::seconds(output_.size() / kSlowestRate);
@@ -118,6 +123,7 @@ void Connection::write() {
   if (count < 0 && would_wait()) return;
   if (count < 0) return enter(State::kClosed);
   sent_ += static_cast<std::size_t>(count);
+  last_sent_ = Clock::now();
   if (sent_ < output_.size()) return;
   output_ = std::string();  // gives its memory back
   sent_ = 0;
@@ -151,6 +157,7 @@ void Connection::answer(Response response, bool keeps_open) {
   output_ = std::move(response.body);
   output_.insert(0, head);
   enter(State::kWriting);
+  last_sent_ = since_;
 }
 
 }  // namespace tomofield::view

@@ -47,6 +47,8 @@ class Connection {
   /// Returns the bytes of the answer in memory.
   std::size_t held_bytes() const { return output_.size(); }
   Clock::time_point since() const { return since_; }  ///< of the state
+  /// Says whether the peer has taken nothing of its answer for a second.
+  bool is_stuck(Clock::time_point now) const;
 
   /// Reads or writes what is possible without waiting, after poll() has found an event. A peer that
   /// hangs up while its answer is computed wants none.
@@ -71,6 +73,7 @@ class Connection {
   Clock::time_point since_ = Clock::now();
   std::string input_, output_;
   std::size_t sent_ = 0;
+  Clock::time_point last_sent_;
   bool keeps_open_ = false;
 };
 

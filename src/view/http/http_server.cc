@@ -66,6 +66,8 @@ struct HttpServer::Impl {
   void take_request(Connection& connection);
   void finish_work();
   void begin_work();
+  std::size_t held_bytes() const;
+  void close_stuck();
   void forget_closed();
 
   int listener;
@@ -136,10 +138,20 @@ void HttpServer::Impl::finish_work() {
   if (done.connection) done.connection->answer(*std::move(answer), done.keeps_open);
 }
 
-void HttpServer::Impl::begin_work() {
+std::size_t HttpServer::Impl::held_bytes() const {
   std::size_t held = 0;
   for (const auto& connection : connections) held += connection->held_bytes();
-  if (is_working || waiting.empty() || held > kMostHeldBytes) return;
+  return held;
+}
+
+void HttpServer::Impl::close_stuck() {
+  const Clock::time_point now = Clock::now();
+  std::erase_if(connections, [&](const auto& connection) { return connection->is_stuck(now); });
+}
+
+void HttpServer::Impl::begin_work() {
+  if (is_working || waiting.empty()) return;
+  if (held_bytes() > kMostHeldBytes) return close_stuck();
   worker.start(waiting.front().work);
   is_working = true;
 }

@@ -14,11 +14,11 @@ using Answer = std::variant<Response, Work>;
 /// A server of HTTP on the loopback interface, which no peer can stall or make take much memory:
 ///
 /// - One thread talks to all connections and waits for none of them. There are at most 128; one
-/// more
-///   closes the one that has been idle for longest.
+///   more closes the one that has been idle for longest.
 /// - The head of a request has at most 32 KiB and 5 s, and bodies are not read.
 /// - Work is done one after another, for at most 32 requests that wait; others get status 503. It
-///   does not begin while 256 MiB of answers are not sent yet, and stops if its peer hangs up.
+///   does not begin while 256 MiB of answers are not sent yet, and stops if its peer hangs up. Work
+///   that waits for this closes connections whose peers have taken nothing for a second.
 class HttpServer {
  public:
   /// Listens on a port of 127.0.0.1; 0 chooses a free one. Throws Error if the port is taken.
