@@ -34,9 +34,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::refuse_or([&] { write_and_read(batch::parse_csv(text, '\t')); });
   const fuzz::InputFile file(data, size);
   fuzz::refuse_or([&] {
-    batch::Faults faults;
+    base::Faults faults;
     batch::read_table(file.path(), {kind_of, {"thickness", "tlt"}}, faults);
-    faults.require_none();
+    batch::require_none(faults);
   });
   return 0;
 }
