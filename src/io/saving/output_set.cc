@@ -68,6 +68,7 @@ struct OutputSet::Change {
   bool is_removal = false;
   bool is_folder = false;
   bool is_made = false;  // the new file or folder has the name
+  fs::path temporary{};  // the name that a new file had before
 
   // Keeps the file that is there under another name: as a second name where the file system has
   // that, so that the first is never missing.
@@ -105,8 +106,10 @@ struct OutputSet::Change {
                                     failed.message()));
   }
 
-  // Gives back the old file or folder. Returns false if that is not possible.
+  // Gives back the old file or folder, and a new file its temporary name, so that commit_only() can
+  // still keep it. Returns false if that is not possible.
   bool undo() const {
+    if (is_made && !is_folder && !link_file(target, temporary)) rename_file(target, temporary);
     if (old.empty() && !is_made) return true;
     if (is_folder) {
       std::error_code failed;
@@ -159,6 +162,7 @@ void OutputSet::make_changes(std::vector<Change>& changes) const {
     changes.push_back(Change::begin(file.target_, false));
     if (!rename_file(file.temporary_path_, file.target_)) throw_cannot_replace(file.path_);
     changes.back().is_made = true;
+    changes.back().temporary = file.temporary_path_;
   }
   for (const AtomicFolder& folder : folders_) {
     changes.push_back(Change::begin_folder(folder.path_));

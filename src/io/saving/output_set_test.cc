@@ -29,6 +29,20 @@ class OutputSetTest : public ::testing::Test {
   fs::path old_ = scratch_.write("old.txt", "old");
 };
 
+TEST_F(OutputSetTest, CanKeepOneFileAfterAnotherCouldNotGetItsName) {
+  OutputSet results;
+  write_text_file(old_, "new");
+  write_text_file(scratch_ / "first.txt", "first");
+  write_text_file(scratch_ / "second.txt", "second");
+  fs::create_directory(scratch_ / "second.txt");
+  EXPECT_THROW(results.commit(), Error);
+  EXPECT_EQ(read_whole_file(old_), "old");
+  EXPECT_FALSE(fs::exists(scratch_ / "first.txt"));
+  EXPECT_TRUE(results.commit_only(scratch_ / "first.txt"));
+  EXPECT_EQ(read_whole_file(scratch_ / "first.txt"), "first");
+  EXPECT_EQ(read_whole_file(old_), "old");
+}
+
 TEST_F(OutputSetTest, GivesAllFilesTheirNamesTogether) {
   OutputSet results;
   write_text_file(old_, "new");
