@@ -69,7 +69,7 @@ def count_of(value: object, what: str) -> int:
 
 
 def numbers_of(values: Any, count: int, one_of: Callable[[object, str], float], what: str) -> Any:
-    """Return a tuple of so many numbers, each as one_of() returns it."""
+    """Return a tuple of `count` numbers, each as one_of() returns it."""
     parts = values if isinstance(values, (tuple, list)) else _array(values).ravel().tolist()
     if len(parts) != count:
         raise TypeError(f"{what} is {count} numbers, not {shown(values)}")

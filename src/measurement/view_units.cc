@@ -70,13 +70,12 @@ void warn_of_levels(const tilt_series::TiltSeries& series, std::span<const doubl
   const double limit = std::max({kNoise * noise, kPart * base::median(sizes_of(levels)),
                                  kUsual * base::median(sizes_of(differences))});
   for (std::size_t view = 0; view < levels.size(); ++view) {
-    if (!(std::fabs(differences[view]) > limit)) continue;
-    const auto section = series.views()[view].section + 1;
     const double difference = std::fabs(differences[view]);
+    if (!(difference > limit)) continue;
+    const auto section = series.views()[view].section + 1;
     base::log_warning(fmt::format(
         "the mean grey level of section {} (tilt {:g}°) is {:.3g} away from that of its "
-        "neighbours, "
-        "{:.2g} times the noise: repair it, or leave it out with --exclude {}",
+        "neighbours, {:.2g} times the noise: repair it, or leave it out with --exclude {}",
         section, series.views()[view].tilt_deg, difference, difference / noise, section));
   }
 }

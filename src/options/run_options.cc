@@ -157,7 +157,7 @@ std::vector<std::string> faults_of_halves(const ReconstructOptions& options) {
   return faults.sentences();
 }
 
-// What filters views needs them aligned.
+// Returns a sentence for each option that filters aligned views where the views are as recorded.
 std::vector<std::string> faults_of_filters(const ReconstructOptions& options) {
   const bool is_ray = options.fit.engine == Engine::kRay;
   base::Faults faults;

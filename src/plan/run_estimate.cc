@@ -196,6 +196,11 @@ std::size_t volume_bytes(const RunPlan& run, const VolumeOptions& options) {
   return num_volumes * static_cast<std::size_t>(num_voxels(run) * bytes_a_voxel);
 }
 
+// Returns the bytes of the volumes and models that stay. The codes of tiles are small.
+std::size_t large_file_bytes(const RunPlan& run, const VolumeOptions& options) {
+  return volume_bytes(run, options) + (run.tiles.is_used() ? 0 : parameter_bytes(run));
+}
+
 // Returns the bytes of the scratch files of the decoded views and of the rays.
 std::size_t scratch_bytes(const tilt_series::PlannedSeries& series,
                           const measurement::Measurement& plan) {
@@ -214,12 +219,11 @@ RunEstimate estimate_run(const tilt_series::PlannedSeries& series,
   plan.transfers = measurement::view_transfers(options.input(), options.specimen.hand, series);
   RunEstimate estimate;
   const std::size_t parameters = parameter_bytes(run);
-  estimate.result_bytes = volume_bytes(run, options.volume) + parameters + kSmallFiles;
+  estimate.result_bytes = large_file_bytes(run, options.volume) + kSmallFiles;
   // A checkpoint has the parameters and two moments, and is there twice while it is replaced. With
   // tiles it is that of the coarse stages.
   const std::size_t in_checkpoint =
       run.tiles.is_used() ? sizeof(float) * run.tiles.coarse_parameters : parameters;
-  if (run.tiles.is_used()) estimate.result_bytes -= parameters;  // codes are small
   estimate.disk_bytes = scratch_bytes(series, plan) +
                         std::max(6 * in_checkpoint, estimate.result_bytes + 3 * in_checkpoint);
   if (plan.ray_geometry) return estimate;
@@ -242,9 +246,8 @@ RunEstimate estimate_run(const tilt_series::PlannedSeries& series,
 void require_disk(const RunPlan& run, const options::ReconstructOptions& options) {
   const std::filesystem::path& output = options.run.output;
   if (output.empty()) return;
-  std::size_t bytes = volume_bytes(run, options.volume);
-  if (!run.tiles.is_used()) bytes += parameter_bytes(run);  // codes are small
-  io::require_room(io::folder_of(output), output, static_cast<std::int64_t>(bytes));
+  io::require_room(io::folder_of(output), output,
+                   static_cast<std::int64_t>(large_file_bytes(run, options.volume)));
 }
 
 }  // namespace tomofield::plan

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pathlib
 
 import harness
 import numpy as np
@@ -226,12 +227,16 @@ def test_the_row_of_the_series_is_taken_though_others_name_the_same_file(relion)
     assert row["rlnTomoName"] == "TS_02"
 
 
+def write_changed(relion, name, old, new):
+    """Writes the project's STAR file with another text in it beside it, and returns its path."""
+    path = pathlib.Path(relion.path("Tomograms/job009"), name)
+    text = pathlib.Path(relion.star).read_text(encoding="utf-8")
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return path
+
+
 def test_a_name_that_two_rows_have_is_refused(relion):
-    path = relion.path("Tomograms/job009/same_names.star")
-    with open(relion.star, encoding="utf-8") as file:
-        text = file.read()
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(text.replace("TS_02 ", "TS_01 "))
+    path = write_changed(relion, "same_names.star", "TS_02 ", "TS_01 ")
     result = harness.tomofield("reconstruct", path, "--series", "TS_01", "-o", relion.path("same.mrc"),
                                *QUICK, cwd=relion.folder)
     assert result.returncode == 2 and "several rows" in result.stderr, result.stderr
@@ -239,11 +244,7 @@ def test_a_name_that_two_rows_have_is_refused(relion):
 
 @pytest.mark.parametrize("hand", ("0.5", "0", "-2"))
 def test_a_hand_that_is_none_is_refused(relion, hand):
-    path = relion.path("Tomograms/job009/hand.star")
-    with open(relion.star, encoding="utf-8") as file:
-        text = file.read()
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(text.replace("1.00000", hand))
+    path = write_changed(relion, "hand.star", "1.00000", hand)
     result = harness.tomofield("reconstruct", path, "--series", "TS_01", "--dry-run", cwd=relion.folder)
     assert result.returncode == 2, result
     for word in ("hand.star", "TS_01", "rlnTomoHand", hand):
@@ -251,11 +252,7 @@ def test_a_hand_that_is_none_is_refused(relion, hand):
 
 
 def test_a_number_beyond_its_range_is_refused_with_its_file(relion):
-    path = relion.path("Tomograms/job009/voltage.star")
-    with open(relion.star, encoding="utf-8") as file:
-        text = file.read()
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(text.replace("200.000000", "-1.000000"))
+    path = write_changed(relion, "voltage.star", "200.000000", "-1.000000")
     result = harness.tomofield("reconstruct", path, "--series", "TS_01", "--dry-run", cwd=relion.folder)
     assert result.returncode == 2, result
     for word in ("voltage.star", "rlnVoltage", "--voltage must be"):

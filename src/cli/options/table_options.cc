@@ -52,7 +52,7 @@ CLI::Option* add_row(CLI::App& command, const Row& row, Choices& choices) {
                                                    : add_value(command, row, choices);
   // CLI11 lists positional arguments apart.
   if (row.group != Group::kSeries) option->group(std::string(option_table::title_of(row.group)));
-  // What a project may state is missed once that was opened (range_faults()).
+  // If a project may state the value, range_faults() misses it after the project is opened.
   return option->required(row.is_required && !row.is_of_project);
 }
 

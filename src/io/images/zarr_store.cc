@@ -63,7 +63,8 @@ auto read_in(const fs::path& store, const fs::path& file, const Read& read) {
   });
 }
 
-// What a store of write_ome_zarr() has, by the descriptions in it.
+// Knows which entries a store of write_ome_zarr() has, since it reads the descriptions in the
+// store.
 class StoreContents {
  public:
   // Throws Error if there is no such description.

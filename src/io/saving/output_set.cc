@@ -67,13 +67,12 @@ struct OutputSet::Change {
   fs::path old;  // empty: there was none
   bool is_removal = false;
   bool is_folder = false;
-  bool is_made = false;  // the new file or folder has the name
-  fs::path temporary{};  // the name that a new file had before
+  fs::path temporary{};  // what the new file was called before; empty: it has no other name yet
 
   // Keeps the file that is there under another name: as a second name where the file system has
   // that, so that the first is never missing.
   static Change begin(const fs::path& target, bool is_removal) {
-    Change change{target, {}, is_removal, false, false};
+    Change change{target, {}, is_removal, false};
     const fs::file_status status = type_at(target);
     if (!fs::exists(status)) return change;
     errno = EISDIR;
@@ -86,7 +85,7 @@ struct OutputSet::Change {
 
   // Keeps the folder that is there under another name.
   static Change begin_folder(const fs::path& target) {
-    Change change{target, {}, false, true, false};
+    Change change{target, {}, false, true};
     if (!fs::exists(type_at(target))) return change;
     change.old = unused_temporary_name(target);
     if (!rename_file(target, change.old)) throw_cannot_replace(target);
@@ -109,6 +108,7 @@ struct OutputSet::Change {
   // Gives back the old file or folder, and a new file its temporary name, so that commit_only() can
   // still keep it. Returns false if that is not possible.
   bool undo() const {
+    const bool is_made = !temporary.empty();
     if (is_made && !is_folder && !link_file(target, temporary)) rename_file(target, temporary);
     if (old.empty() && !is_made) return true;
     if (is_folder) {
@@ -161,13 +161,12 @@ void OutputSet::make_changes(std::vector<Change>& changes) const {
   for (const AtomicFile& file : files_) {
     changes.push_back(Change::begin(file.target_, false));
     if (!rename_file(file.temporary_path_, file.target_)) throw_cannot_replace(file.path_);
-    changes.back().is_made = true;
     changes.back().temporary = file.temporary_path_;
   }
   for (const AtomicFolder& folder : folders_) {
     changes.push_back(Change::begin_folder(folder.path_));
     if (!rename_file(folder.temporary_path_, folder.path_)) throw_cannot_replace(folder.path_);
-    changes.back().is_made = true;
+    changes.back().temporary = folder.temporary_path_;
   }
 }
 
