@@ -53,6 +53,27 @@ py::object numpy_array(const std::string& otherwise, Arguments&&... arguments) {
   }
 }
 
+// Lets NumPy raise an exception for numbers that a type cannot hold, for as long as it lives.
+class StrictConversion {
+ public:
+  StrictConversion()
+      : state_(py::module_::import("numpy").attr("errstate")(py::arg("over") = "raise")) {
+    state_.attr("__enter__")();
+  }
+  ~StrictConversion() {
+    try {
+      state_.attr("__exit__")(py::none(), py::none(), py::none());
+    } catch (py::error_already_set& error) {
+      error.discard_as_unraisable("numpy.errstate");
+    }
+  }
+  StrictConversion(const StrictConversion&) = delete;
+  StrictConversion& operator=(const StrictConversion&) = delete;
+
+ private:
+  py::object state_;
+};
+
 // Returns an array of real numbers from whatever NumPy makes one of. All arrays of users pass here:
 // NumPy would drop imaginary parts and masks, and read texts and dates as numbers.
 template <class Number>
@@ -65,6 +86,7 @@ Array<Number> numbers_of(const py::object& object) {
   if (std::string_view("biuf").find(array.dtype().kind()) == std::string_view::npos)
     throw Error("an array of real numbers is needed, not one of type " +
                 py::str(array.dtype()).cast<std::string>());
+  const StrictConversion strict;
   return numpy_array("an array of type " + py::str(array.dtype()).cast<std::string>() +
                          " has numbers that are too large",
                      array, py::dtype::of<Number>(), "C");

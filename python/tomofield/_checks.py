@@ -178,10 +178,11 @@ def _is_sequence(value: object) -> bool:
 
 
 def _would_be_misread(name: str, value: object) -> bool:
-    """Return True if pybind11 would take True for 1, drop imaginary parts, or count days."""
+    """Return True if pybind11 would take True for 1, drop imaginary parts or masks, or count
+    days."""
     if isinstance(value, bool):
         return "True or False" not in _kind_of(name)
-    return any(leaf.dtype.kind in "bcmM" for leaf in _leaves(value))
+    return is_masked(value) or any(leaf.dtype.kind in "bcmM" for leaf in _leaves(value))
 
 
 def _beyond(name: str, value: Any) -> str:

@@ -218,8 +218,7 @@ def write_mrc(path: Path, volume: npt.ArrayLike, voxel_size_A: Optional[float] =
     voxel_size_A: side of a voxel in Å, which an array needs and a Tomogram has.
     """
     size, file = _voxel_size(voxel_size_A, volume), path_of(path, "the output")
-    with np.errstate(over="raise"):  # numbers that are too large for 32 bits are refused
-        _core.write_mrc(array_of(volume), size, file, switch_of(overwrite, "overwrite"))
+    _core.write_mrc(array_of(volume), size, file, switch_of(overwrite, "overwrite"))
 
 
 def _voxel_size(given: Optional[float], *volumes: Any) -> float:

@@ -51,8 +51,12 @@ bool RunningJob::has_ended() {
   if (!result) return false;
   State& state = session_.state;
   state.costs = state.costs + result->costs;
-  if (result->exit_status == 0) {
+  if (result->exit_status == 0 && has_results(job_->output)) {
     state.progress = Progress::kDone;
+  } else if (result->exit_status == 0) {
+    state.progress = Progress::kFailed;
+    state.reason = fmt::format("the run ended without its results, '{}' and its metrics",
+                               job_->output.string());
   } else if (was_stopped(result->exit_status)) {
     state.progress = Progress::kStopped;
     state.reason = base::reason_of_failure(log_of(options_->folder, *job_));

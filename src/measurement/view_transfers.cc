@@ -192,9 +192,16 @@ std::vector<std::size_t> order_of(const Exposures& exposures) {
 // Reads the doses of an .mdoc. With `of_view`, the order of recording alone counts.
 Recording recording_of_mdoc(const std::filesystem::path& path, bool of_view) {
   const io::Mdoc mdoc = io::read_mdoc(path);
-  Recording found{path, {}, io::acquisition_order(mdoc).sections, {}};
+  const io::AcquisitionOrder order = io::acquisition_order(mdoc);
+  Recording found{path, {}, order.sections, {}};
   for (const io::MdocSection& section : mdoc.sections) found.tilt_deg.push_back(section.tilt_deg);
   if (of_view) {
+    if (!order.fault_of_times.empty()) {
+      throw Error(
+          fmt::format("'{}': {}, so --dose-per-tilt has no order of recording: complete DateTime, "
+                      "or leave --mdoc out if the stack is in that order",
+                      path.string(), order.fault_of_times));
+    }
     if (microscope::contradicts_prior_doses(found.order, mdoc)) {
       throw Error(fmt::format(
           "'{}': PriorRecordDose is missing in some sections and contradicts the order of the "
@@ -235,6 +242,20 @@ std::optional<Recording> find_recording(const SeriesFiles& files, const Sections
   return std::nullopt;
 }
 
+// Refuses exposures in which no specimen keeps a signal.
+void require_bearable(const Exposures& exposures, const std::string& source) {
+  constexpr double kMost = 2000;  // ten times a usual series
+  double all = 0.0;
+  for (const microscope::Exposure& exposure : exposures)
+    all = std::max(all, exposure.before + exposure.of_view);
+  if (all <= kMost) return;
+  throw Error(fmt::format(
+      "the doses of {} add up to {:g} electrons per Å², and at most {:g} are allowed, because late "
+      "views would have no signal: give the dose of one view, or --dose-per-tilt 0 to leave the "
+      "radiation damage out",
+      source, all, kMost));
+}
+
 // Returns the exposure of each section, or nothing if it is not known or not wanted.
 std::optional<Exposures> find_exposures(const SeriesFiles& files, const ViewOptions& options,
                                         const Sections& sections) {
@@ -253,7 +274,9 @@ std::optional<Exposures> find_exposures(const SeriesFiles& files, const ViewOpti
         *of_view));
     std::vector<std::size_t> as_stacked(static_cast<std::size_t>(sections.count));
     std::iota(as_stacked.begin(), as_stacked.end(), std::size_t{0});
-    return microscope::exposures_in_order(as_stacked, *of_view);
+    const Exposures of_section = microscope::exposures_in_order(as_stacked, *of_view);
+    require_bearable(of_section, "--dose-per-tilt");
+    return of_section;
   }
   if (!of_view && !recording->doses) return std::nullopt;
   base::log_info(of_view ? fmt::format("dose: {} electrons per Å² a view, in the order of '{}'",
@@ -261,6 +284,8 @@ std::optional<Exposures> find_exposures(const SeriesFiles& files, const ViewOpti
                          : fmt::format("dose: from '{}'", recording->file.string()));
   const Exposures of_row =
       of_view ? microscope::exposures_in_order(recording->order, *of_view) : *recording->doses;
+  require_bearable(of_row,
+                   of_view ? "--dose-per-tilt" : fmt::format("'{}'", recording->file.string()));
   const auto rows = rows_of_sections(sections, of_row.size(), recording->tilt_deg, recording->file,
                                      /*is_ctf=*/false);
   Exposures of_section(static_cast<std::size_t>(sections.count));

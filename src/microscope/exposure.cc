@@ -141,6 +141,9 @@ MdocExposures exposures_of(const io::Mdoc& mdoc) {
   const bool has_some_prior = no_prior.size() < mdoc.sections.size();
   if (no_dose.empty()) {
     const io::AcquisitionOrder order = io::acquisition_order(mdoc);
+    if (!order.fault_of_times.empty())
+      return {std::nullopt, fmt::format("{}, and nothing else tells the order of recording",
+                                        order.fault_of_times)};
     std::vector<double> doses;
     for (const io::MdocSection& section : mdoc.sections) doses.push_back(*section.dose);
     std::vector<Exposure> exposures = exposures_in_order(order.sections, doses);

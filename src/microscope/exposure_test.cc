@@ -116,6 +116,29 @@ TEST(ExposuresOfMdoc, NeverContradictAPriorDoseThatIsKnown) {
   EXPECT_NE(timed.fault.find("contradict"), std::string::npos);
 }
 
+TEST(ExposuresOfMdoc, AreUnknownIfTimesGiveNoOrder) {
+  const std::string dose = "ExposureDose = 3\n", time = "DateTime = 12-Mar-21 10:00:0";
+  const auto fault = [&](const std::vector<std::string>& entries) {
+    const MdocExposures found = without_times(entries);
+    EXPECT_FALSE(found.of_section);
+    return found.fault;
+  };
+  EXPECT_EQ(fault({dose + time + "2", dose + "DateTime = 12/03/21 10:00"}),
+            "line 6: DateTime is not a date and a time such as 12-Mar-21 15:31:02, and nothing "
+            "else tells the order of recording");
+  EXPECT_EQ(fault({dose + time + "2", dose, dose}),
+            "[ZValue = 1] has no DateTime, and nothing else tells the order of recording");
+  EXPECT_EQ(
+      fault({dose + time + "2", dose + time + "1", dose + time + "2"}),
+      "[ZValue = 0] and [ZValue = 2] have the same DateTime, and nothing else tells the order "
+      "of recording");
+  // Doses before the sections tell the order as well.
+  const MdocExposures told = without_times(
+      {dose + "PriorRecordDose = 3\nDateTime = x", dose + "PriorRecordDose = 0\nDateTime = y"});
+  ASSERT_TRUE(told.of_section);
+  EXPECT_EQ((*told.of_section)[0].before, 3.0);
+}
+
 TEST(ExposuresOfMdoc, SaysWhatIsMissing) {
   const std::string dose = "ExposureDose = 3";
   EXPECT_EQ(without_times({dose, "ExposureDose = 0", dose}).fault,

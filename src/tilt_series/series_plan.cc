@@ -189,6 +189,20 @@ void warn_of_sections_beyond(const TiltSeriesOptions& options, const io::ImageSt
       stack.name(), stack.header().nz, facts->sections_beyond));
 }
 
+/// Warns if an .mdoc states another size than the header of its stack. Stacks are often binned by a
+/// whole number, and the sizes of headers are often calibrated.
+void warn_of_other_size(const io::Mdoc& mdoc, const std::filesystem::path& path,
+                        const io::ImageStack& stack) {
+  constexpr double kCalibration = 0.1;
+  const double in_header_A = stack.header().voxel_size_A[0];
+  const double ratio = in_header_A / mdoc.pixel_spacing_A.value_or(in_header_A);
+  if (std::fabs(ratio / std::max(1.0, std::round(ratio)) - 1.0) < kCalibration) return;
+  base::log_warning(
+      fmt::format("'{}' states pixels of {:.6g} Å, and '{}' of {:.6g} Å: the latter is taken (give "
+                  "the right size with --pixel-size)",
+                  path.string(), *mdoc.pixel_spacing_A, stack.name(), in_header_A));
+}
+
 /// Returns the size of an unbinned pixel in Å: --pixel-size, else the header's, else the mdoc's.
 double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& stack,
                        const std::optional<io::Mdoc>& mdoc) {
@@ -205,7 +219,10 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& s
     const double stated_A = pixel_size_of_mdoc(*mdoc, *options.mdoc, stack);
     if (stated_A > 0.0) return stated_A;
   }
-  if (in_header_A > 0.0 && !is_default) return in_header_A;
+  if (in_header_A > 0.0 && !is_default) {
+    if (mdoc) warn_of_other_size(*mdoc, *options.mdoc, stack);
+    return in_header_A;
+  }
   if (stack.is_in_memory()) {
     if (in_header_A > 0.0) return in_header_A;
     throw Error("views in memory have no pixel size: give it in Å with --pixel-size");

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/log.h"
 #include "tomofield/error.h"
 
 namespace tomofield::tilt_series {
@@ -71,13 +72,21 @@ std::string describe_steep(const TiltAngles& angles, const std::vector<std::int6
 void require_different(const TiltAngles& angles, std::span<const std::int64_t> sections,
                        const io::ImageStack& stack) {
   constexpr double kLeastSpan_deg = 0.1;  // stages are less exact
+  constexpr double kRadians = 3.2;        // the span of no usual series in degrees
+  constexpr std::ptrdiff_t kFewestViews = 5;
   if (sections.size() < 2) return;
   const auto [low, high] = std::ranges::minmax(sections, {}, [&](std::int64_t section) {
     return angles.of_section[static_cast<std::size_t>(section)]->value;
   });
   const double lowest = angles.of_section[static_cast<std::size_t>(low)]->value;
   const double highest = angles.of_section[static_cast<std::size_t>(high)]->value;
-  if (highest - lowest >= kLeastSpan_deg) return;
+  if (highest - lowest >= kLeastSpan_deg) {
+    if (highest - lowest < kRadians && std::ssize(sections) >= kFewestViews)
+      base::log_warning(fmt::format(
+          "'{}': the tilts reach from {:.6g}° to {:.6g}° only: give degrees, if these are radians",
+          angles.source, lowest, highest));
+    return;
+  }
   throw Error(fmt::format(
       "'{}': the tilts of all {} sections are {:.6g}°{}, which is no tilt series: give {}",
       angles.source, sections.size(), lowest + 0.0,

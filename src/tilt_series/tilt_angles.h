@@ -36,7 +36,8 @@ void require_count(std::size_t found, const std::filesystem::path& file, const c
                    const io::ImageStack& stack);
 
 /// Throws Error that names all of these sections at once whose angle is missing or beyond ±80°
-/// (file, line, value), or if the angles of several sections are all the same.
+/// (file, line, value), or if the angles of several sections are all the same. Warns of angles that
+/// may be radians.
 void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t> sections,
                           const io::ImageStack& stack);
 

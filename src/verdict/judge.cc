@@ -1,6 +1,9 @@
 #include "verdict/judge.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <string>
 #include <vector>
 
 #include "base/statistics.h"
@@ -40,6 +43,27 @@ PriorSummary prior_summary(const FinishedFit& finished) {
   return summary;
 }
 
+// Returns the options of which no series needs such a value: GivenInput::extreme_settings.
+std::vector<std::string> extreme_settings(const options::ReconstructOptions& options) {
+  constexpr double kTimes = 7;  // weights beyond the usual one
+  constexpr double kMostFactorVariation = 100, kMostFourier = 1e4, kMostSpacing = 4;
+  constexpr double kLeastRate = 0.005, kMostRate = 0.5;
+  const FitOptions& fit = options.fit;
+  const double rate = fit.learning_rate.value();
+  std::vector<std::string> found;
+  const auto add = [&](bool is_extreme, const char* option, double value) {
+    if (is_extreme) found.push_back(fmt::format("{} {:g}", option, value));
+  };
+  const double variation = fit.density_variation.value();
+  add(variation > kTimes * FitOptions{}.density_variation.value(), "--tv", variation);
+  add(fit.factor_variation > kMostFactorVariation, "--tv-factors", fit.factor_variation);
+  add(fit.fourier > kMostFourier, "--ifp", fit.fourier);
+  add(options.field.vertex_spacing > kMostSpacing, "--vertex-spacing",
+      options.field.vertex_spacing);
+  add(rate < kLeastRate || rate > kMostRate, "--learning-rate", rate);
+  return found;
+}
+
 }  // namespace
 
 Verdict judge(const FinishedFit& finished, const std::optional<measurement::ViewErrors>& held_out) {
@@ -58,12 +82,14 @@ Verdict judge(const FinishedFit& finished, const std::optional<measurement::View
   if (!series.ray_geometry) verdict.defocus = check_defocus(fit, series);
   verdict.seconds = finished.options.since_start.seconds();
   verdict.peak_GiB = processes.allreduce_max(static_cast<double>(base::peak_memory())) / (1 << 30);
-  verdict.warnings = find_warnings(verdict, {.contrast = finished.options.views.contrast,
-                                             .alignment = finished.alignment,
-                                             .tilt_deg = series.geometry.tilt_deg,
-                                             .thickness = series.geometry.thickness,
-                                             .bin_factor = series.bin_factor,
-                                             .aligned_before = finished.options.run.align});
+  verdict.warnings =
+      find_warnings(verdict, {.contrast = finished.options.views.contrast,
+                              .alignment = finished.alignment,
+                              .tilt_deg = series.geometry.tilt_deg,
+                              .thickness = series.geometry.thickness,
+                              .bin_factor = series.bin_factor,
+                              .aligned_before = finished.options.run.align,
+                              .extreme_settings = extreme_settings(finished.options)});
   return verdict;
 }
 

@@ -116,6 +116,17 @@ std::optional<Warning> empty_tomogram(const std::vector<double>& section_deviati
                  "whose grey levels differ from the rest, and check --contrast and --black-level"};
 }
 
+// Settings that keep the fit from explaining the views look like faults of the input.
+std::optional<Warning> extreme_settings(const Verdict& verdict,
+                                        const std::vector<std::string>& settings) {
+  if (settings.empty() || verdict.residual < kMostResidual) return std::nullopt;
+  return Warning{"settings",
+                 fmt::format("the tomogram does not explain the views: it leaves {:.3g} times the "
+                             "variance of their noise. Settings that were given prevent it: leave "
+                             "out {}, or give values nearer to the usual ones",
+                             verdict.residual, fmt::join(settings, ", "))};
+}
+
 std::optional<Warning> wrong_contrast(const Verdict& verdict, Contrast given) {
   const PathEffect& path = verdict.views->path;
   const bool is_sure = verdict.residual > kResidualOfWrongContrast && !verdict.defocus;
@@ -358,7 +369,7 @@ std::optional<Warning> unexplained(const Verdict& verdict, Alignment aligned_bef
   return Warning{
       "residual",
       fmt::format(
-          "the tomogram does not explain the views: it leaves {:.2g} times the variance of "
+          "the tomogram does not explain the views: it leaves {:.3g} times the variance of "
           "their noise. Check the tilt angles and {}, and look for views that are damaged or "
           "differ from the rest",
           verdict.residual, advice_on_alignment(aligned_before))};
@@ -406,6 +417,7 @@ std::vector<Warning> faults_of_views(const Verdict& verdict, const GivenInput& i
 std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& input) {
   std::vector<Warning> warnings;
   if (const auto empty = empty_tomogram(verdict.artefacts.section_deviation)) return {*empty};
+  if (const auto extreme = extreme_settings(verdict, input.extreme_settings)) return {*extreme};
   if (verdict.views) warnings = faults_of_views(verdict, input);
   if (!warnings.empty()) return warnings;
   const auto add = [&](std::optional<Warning> found) {

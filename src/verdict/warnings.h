@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "geometry/raw_from_aligned.h"
@@ -17,6 +18,8 @@ struct GivenInput {
   double thickness = 0.0;                      ///< in pixels of the fit
   double bin_factor = 1.0;                     ///< of these pixels to the stack's
   Alignment aligned_before = Alignment::kOff;  ///< RunOptions::align
+  /// Options of the fit, as on the command line, that are far from what any series needs.
+  std::vector<std::string> extreme_settings = {};
 };
 
 /// Returns what is off in a run, the most serious first. Faults of the series as a whole (views

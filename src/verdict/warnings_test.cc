@@ -46,6 +46,19 @@ TEST(Warnings, AGoodRunHasNone) {
   EXPECT_EQ(codes(raw_views), "");
 }
 
+TEST(Warnings, ExtremeSettingsAreNamedBeforeTheAlignment) {
+  Verdict verdict = good_verdict();
+  GivenInput input = aligned_input();
+  input.extreme_settings = {"--vertex-spacing 64", "--tv 1000"};
+  EXPECT_EQ(codes(verdict, input), "");
+  verdict.residual = 12;
+  verdict.views->displacement_px.assign(16, {10, 10});
+  EXPECT_EQ(codes(verdict), "unaligned ");
+  EXPECT_EQ(codes(verdict, input), "settings ");
+  const std::string said = find_warnings(verdict, input).front().message;
+  EXPECT_NE(said.find("leave out --vertex-spacing 64, --tv 1000"), std::string::npos) << said;
+}
+
 TEST(Warnings, AdviceOnTheAlignmentIsWhatIsLeftToTry) {
   Verdict verdict = good_verdict();
   verdict.residual = 50;

@@ -500,6 +500,14 @@ def test_tilts_that_hardly_differ_are_no_series(refuse_series, stack, text_file)
         refuse_series([file, "no tilt series", str(NUM_VIEWS)], stack, "--tlt", file)
 
 
+def test_tilts_in_radians_are_doubted(stack, text_file):
+    radians = np.radians(np.linspace(-60, 60, NUM_VIEWS))
+    for tilts, is_doubted in ((radians, True), (3 * radians, False)):
+        file = text_file("radians.tlt", "".join(f"{tilt:.5f}\n" for tilt in tilts))
+        ended = harness.succeed("info", stack, "--tlt", file)
+        assert ("give degrees" in ended.stderr) == is_doubted, ended.stderr
+
+
 def test_x_axis_tilts_and_bins_that_make_no_sense(refuse_series, stack, text_file):
     for tilt in ("91", "-80.5"):
         file = text_file("steep.xtilt", "0\n" * 3 + tilt + "\n" + "0\n" * (NUM_VIEWS - 4))

@@ -158,6 +158,15 @@ def test_a_disk_that_says_it_is_full_is_written_with_a_warning(library, series):
     assert told.same_as(series.reconstruct("truth"))
 
 
+def test_a_full_disk_is_refused_before_the_work(series, tmp_path):
+    ended, left = on_small_disk(tmp_path, 64, {}, "sh", "-c",
+                                'head -c 64k /dev/zero > full; exec "$@"', "sh", harness.PROGRAM,
+                                "reconstruct", *series.input, *QUICK, "-o", "out.mrc")
+    said = [line for line in ended.stderr.splitlines() if line.startswith("tomofield: ")]
+    assert ended.returncode == 2 and len(said) == 1 and "out.mrc" in said[0], ended
+    assert "epoch" not in ended.stderr and left == ["full"], (ended.stderr, left)
+
+
 @pytest.mark.parametrize("more", [[], ["--split-tilts"], ["--zarr"]])
 def test_too_small_a_disk_is_refused_before_the_work(library, series, tmp_path, more):
     ended = harness.tomofield("reconstruct", *series.input, *QUICK, *more, "-o", tmp_path / "out.mrc",

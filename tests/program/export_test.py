@@ -89,14 +89,14 @@ def test_a_part_knows_where_it_lies(whole, box):
 
 def test_a_box_that_no_machine_samples_is_refused_before_the_work():
     result = harness.tomofield("export", "model.h5", "-o", "large.mrc", "--center", "0,0,0", "--size",
-                               "2147483647,2147483647,4")
+                               "16000000,16000000,4")
     assert result.returncode == 2 and "too large" in result.stderr
     assert not pathlib.Path("large.mrc").exists()
 
 
 @pytest.mark.parametrize("size, says", (("20000,20000,10000", "its disk has only"),
                                         ("1,1000000,1000000", "GiB of memory"),
-                                        ("2147483647,1,1000", "its disk has only")))
+                                        ("16000000,1,200000", "its disk has only")))
 def test_a_volume_larger_than_its_disk_or_the_memory_is_refused_before_the_work(size, says):
     result = harness.tomofield("export", "model.h5", "-o", "large.mrc", "--center", "16,16,8", "--size",
                                size, timeout=60)

@@ -371,6 +371,16 @@ def test_the_pixel_size_of_a_binned_record():
     expect(dry(folder, "TS_01.mdoc"), "pixels of 1.35 Å")
 
 
+@pytest.mark.parametrize("spacing_A, is_other", [(7, True), (20, True), (5, False), (9.7, False)])
+def test_an_mdoc_of_another_pixel_size_is_doubted(spacing_A, is_other):
+    """The stack has pixels of 10 Å. One that is twice binned, or calibrated, is that of the .mdoc."""
+    folder = write_series("other_pixels")
+    write(folder, "TS_01.mdoc", mdoc_text(head=f"PixelSpacing = {spacing_A}"))
+    said = dry(folder, "TS_01.mrc", "--mdoc", "TS_01.mdoc", "--tlt", "TS_01.rawtlt")
+    assert ("the latter is taken" in said) == is_other, said
+    expect(said, "pixels of 10 Å")
+
+
 def test_the_contrast_transfer_beside_a_project_is_used():
     folder = write_etomo("etomo_ctf", 0.0, newst="", tilt="FULLIMAGE 72 56\n")
     defocus = "".join(f"{i + 1} {i + 1} {tilt:.2f} {tilt:.2f} 3000{' 2' if i == 0 else ''}\n"
@@ -428,6 +438,29 @@ def test_the_mdoc_of_the_uncut_stack_is_matched_by_tilt():
     expect(dry(folder, *words, status=2), "all.mdoc", "21 sections", "TS_01.mrc", "15 sections")
     np.savetxt(os.path.join(folder, "odd.tlt"), TILTS + 3, fmt="%.2f")
     expect(dry(folder, *words, "--tlt", "odd.tlt", status=2), "all.mdoc", "21", "15")
+
+
+def test_times_that_give_no_order_are_named():
+    folder = write_series("untimed")
+    times = [f"12-Mar-21 10:{i:02}:00" for i in range(len(TILTS))]
+    times[3] = "12/03/21 10:03"
+    write(folder, "TS_01.mdoc", mdoc_text(
+        TILTS, "PixelSpacing = 10", lambda i: f"ExposureDose = 3\nDateTime = {times[i]}\n"))
+    words = ["TS_01.mrc", "--mdoc", "TS_01.mdoc", "--tlt", "TS_01.rawtlt", "--defocus", 3]
+    printed = dry(folder, *words)
+    expect(printed, "warning: 'TS_01.mdoc': line", "DateTime is not a date and a time", "not used")
+    assert exposure_line(printed) == []
+    expect(dry(folder, *words, "--dose-per-tilt", 3, status=2), "TS_01.mdoc", "line", "DateTime")
+
+
+def test_doses_that_no_specimen_bears_are_refused():
+    folder = write_series("burnt")
+    write(folder, "TS_01.mdoc", mdoc_text(
+        TILTS, "PixelSpacing = 10", lambda i: f"PriorRecordDose = {300 * i}\n"))
+    words = ["TS_01.mrc", "--tlt", "TS_01.rawtlt", "--defocus", 3]
+    expect(dry(folder, *words, "--dose-per-tilt", 300, status=2), "--dose-per-tilt add up to 4500")
+    expect(dry(folder, *words, "--mdoc", "TS_01.mdoc", status=2), "'TS_01.mdoc' add up to 4500")
+    expect(dry(folder, *words, "--mdoc", "TS_01.mdoc", "--dose-per-tilt", 0), "an underfocus of 3")
 
 
 def test_a_defocus_file_that_ends_early_goes_on():

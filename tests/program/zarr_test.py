@@ -134,7 +134,7 @@ def test_a_store_into_which_others_put_something_stays(finished, version):
     written = marker.read_bytes()
     marker.write_bytes(b"")
     refused = harness.tomofield(*command)
-    assert refused.returncode == 2 and "not as tomofield writes it" in refused.stderr, refused.stderr
+    assert refused.returncode == 2 and "does not show that tomofield wrote it" in refused.stderr, refused.stderr
     marker.write_bytes(written)
     harness.succeed(*command)
     plain = [word for word in command if not word.startswith("--zarr") and word != version]

@@ -24,6 +24,8 @@ CALLS = {
     "a series is": lambda m, s: tomofield.align({}),
     "progress is a function": lambda m, s: tomofield.reconstruct(VIEWS, TILTS, pixel_size_A=1,
                                                               progress=3),
+    "thickness cannot be masked: give a number": lambda m, s: tomofield.reconstruct(
+        s, thickness=np.ma.masked),
     "thickness cannot be 'much': give a number": lambda m, s: tomofield.reconstruct(s,
                                                                                 thickness="much"),
     "rank cannot be 2.5: give a whole number or None": lambda m, s: tomofield.reconstruct(
@@ -142,6 +144,8 @@ SENTENCES = (
     (MASKED_ELEMENTS, lambda m: m.sample_points(np.ma.masked_array([[1, 2, 3]], mask=True))),
     (MASKED_ELEMENTS, lambda m: tomofield.score_volume(VIEWS, MASKED)),
     (MASKED_ELEMENTS, lambda m: tomofield.write_mrc("x.mrc", MASKED, 1.0)),
+    ("float64 has numbers that are too large", lambda m: tomofield.reconstruct(
+        np.full((3, 8, 8), 1e300), TILTS, pixel_size_A=1)),
     ("no masked voxels", lambda m: tomofield.Tomogram(MASKED, 1.0)),
     ("no masked voxels", lambda m: tomofield.Tomogram(list(MASKED), 1.0)),
     ("tilt angles are numbers, not True or False", lambda m: fit(tilts=np.array(TILTS) > 0)),
@@ -167,9 +171,10 @@ SENTENCES = (
 
 
 @pytest.mark.parametrize("said, call", SENTENCES)
-def test_what_cannot_be_used_is_refused_in_a_sentence(model, said, call):
+def test_what_cannot_be_used_is_refused_in_a_sentence(model, said, call, recwarn):
     with pytest.raises(tomofield.Error, match=said):
         call(model)
+    assert not recwarn.list  # numpy warns of what it casts
 
 
 def test_errors_say_what_they_are():

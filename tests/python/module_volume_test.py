@@ -87,6 +87,9 @@ def test_mrc_files_are_written_and_read(made, tmp_path):
     views = np.array([[[np.nan, np.inf, 1, 2]]])  # a tilt series may have such pixels
     tomofield.write_mrc(path, views, 2.5, overwrite=True)
     np.testing.assert_array_equal(tomofield.read_mrc(path).values, views)
+    with mrcfile.open(path) as file:  # what MRC2014 says where nothing is determined
+        head = file.header
+        assert (head.dmin, head.dmax, head.dmean, head.rms) == (0, -1, -2, -1)
     with pytest.raises(tomofield.Error, match="absent.mrc"):
         tomofield.read_mrc("absent.mrc")
 

@@ -109,11 +109,11 @@ OrientedBox box_between_corners(const std::string& corners, double voxel_px) {
   const field::Point low = point(numbers.data()), high = point(numbers.data() + 3);
   for (std::size_t a = 0; a < 3; ++a) {
     const double voxels = (high[a] - low[a]) / voxel_px;
-    if (voxels > 0 && voxels <= std::numeric_limits<std::int32_t>::max()) continue;
-    throw Error(fmt::format("--box has {} from {} to {}, {:.6g} voxels: {}", "xyz"[a], low[a],
-                            high[a], voxels,
-                            voxels > 0 ? "at most 2147483647 are allowed"
-                                       : "give x0,y0,z0,x1,y1,z1 with the low corner first"));
+    if (voxels > 0 && voxels <= field::kMostVoxelsAlongAxis) continue;
+    throw Error(fmt::format(
+        "--box has {} from {} to {}, {:.6g} voxels: {}", "xyz"[a], low[a], high[a], voxels,
+        voxels > 0 ? fmt::format("at most {} are allowed", field::kMostVoxelsAlongAxis)
+                   : "give x0,y0,z0,x1,y1,z1 with the low corner first"));
   }
   return field::box_between(low, high, voxel_px);
 }
@@ -183,8 +183,7 @@ std::int64_t side_of(const ExportArguments& arguments) {
   if (arguments.box.empty()) return 0;
   const double side =
       parse_numbers(arguments.box, 1, "the side of the boxes in voxels (--box N)").front();
-  const bool is_side =
-      side == std::floor(side) && side >= 1 && side <= std::numeric_limits<std::int32_t>::max();
+  const bool is_side = side == std::floor(side) && side >= 1 && side <= field::kMostVoxelsAlongAxis;
   return is_side ? static_cast<std::int64_t>(side) : 0;
 }
 
@@ -240,7 +239,7 @@ void add_box_options(CLI::App& command, ExportArguments& arguments) {
                           ->delimiter(',')
                           ->expected(3)
                           ->type_name("NX,NY,NZ")
-                          ->check(number_between(1, std::numeric_limits<std::int32_t>::max()))
+                          ->check(number_between(1, field::kMostVoxelsAlongAxis))
                           ->needs(centre)
                           ->group(group);
   centre->needs(size);

@@ -45,7 +45,7 @@ CLI::Validator number_above(double low) {
 }
 
 CLI::Validator number_between(double low, double high) {
-  return number_that(fmt::format("from {:g} to {:g}", low, high),
+  return number_that(fmt::format("from {:.10g} to {:.10g}", low, high),
                      [low, high](double value) { return value >= low && value <= high; });
 }
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "base/check.h"
@@ -138,12 +137,6 @@ Point OrientedBox::position(const Point& voxel) const {
   return at;
 }
 
-namespace {
-
-constexpr double kMostSide = std::numeric_limits<std::int32_t>::max();  // voxels along an axis
-
-}  // namespace
-
 OrientedBox box_between(const Point& low, const Point& high, double voxel_px) {
   // Sizes that are whole but for rounding count as whole.
   constexpr double kRounding = 1e-6;
@@ -152,11 +145,11 @@ OrientedBox box_between(const Point& low, const Point& high, double voxel_px) {
   for (std::size_t a = 0; a < 3; ++a) {
     box.centre_px[a] = (low[a] + high[a]) / 2;
     const double voxels = std::floor((high[a] - low[a]) / voxel_px + kRounding);
-    if (!(voxels <= kMostSide))
+    if (!(voxels <= kMostVoxelsAlongAxis))
       throw Error(
           fmt::format("voxels of {:g} px are too small: there would be {:.2g} along an axis, and "
-                      "at most {:.0f} are allowed",
-                      voxel_px, voxels, kMostSide));
+                      "at most {} are allowed",
+                      voxel_px, voxels, kMostVoxelsAlongAxis));
     box.size[a] = std::max<std::int64_t>(1, static_cast<std::int64_t>(voxels));
   }
   return box;
@@ -171,12 +164,12 @@ double num_points(const OrientedBox& box) {
 void require_feasible(const OrientedBox& box) {
   constexpr double kMostPoints = 1e13;  // hours to days of a machine
   const double points = num_points(box);
-  const auto side = static_cast<double>(*std::ranges::max_element(box.size));
-  if (points <= kMostPoints && side <= kMostSide) return;
+  if (points <= kMostPoints && *std::ranges::max_element(box.size) <= kMostVoxelsAlongAxis) return;
   throw Error(fmt::format(
       "a box of {} × {} × {} voxels of {:g} px is too large: sampling it takes {:.2g} points, and "
-      "at most {:.0g} are allowed, with at most {:.0f} voxels along an axis",
-      box.size[0], box.size[1], box.size[2], box.voxel_px, points, kMostPoints, kMostSide));
+      "at most {:.0g} are allowed, with at most {} voxels along an axis",
+      box.size[0], box.size[1], box.size[2], box.voxel_px, points, kMostPoints,
+      kMostVoxelsAlongAxis));
 }
 
 std::int64_t points_per_voxel(const OrientedBox& box) {

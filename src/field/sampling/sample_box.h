@@ -36,16 +36,19 @@ struct OrientedBox {
   Point position(const Point& voxel) const;
 };
 
+/// The voxels that a box may have along an axis. A row of them is sampled within a second.
+inline constexpr std::int64_t kMostVoxelsAlongAxis = std::int64_t{1} << 24;
+
 /// Returns the box with corners `low` and `high`, about the same centre, as far as whole voxels
-/// fill it (at least one). Throws Error for voxels of which 2³¹ or more would fill a side.
+/// fill it (at least one). Throws Error for more than kMostVoxelsAlongAxis voxels in a side.
 OrientedBox box_between(const Point& low, const Point& high, double voxel_px);
 
 /// Returns the number of points in all voxels of a box.
 double num_points(const OrientedBox& box);
 
 /// Throws Error for a box that cannot be sampled in reasonable time: with more than 10¹³ points in
-/// all of its voxels, or a side of 2³¹ voxels or more. All arithmetic on the sizes of a box is safe
-/// after that.
+/// all of its voxels, or a side of more than kMostVoxelsAlongAxis. All arithmetic on the sizes of a
+/// box is safe after that.
 void require_feasible(const OrientedBox& box);
 
 /// Returns the number of points along each axis whose mean is a voxel: 1 for voxels up to one

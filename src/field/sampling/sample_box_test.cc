@@ -169,6 +169,8 @@ TEST(SampleBox, BoxesThatNoMachineSamplesAreRefused) {
   EXPECT_TRUE(refuses({k1 << 62, 4, 4}, 1));
   EXPECT_TRUE(refuses({4, 1, k1 << 62}, 1));
   EXPECT_TRUE(refuses({k1 << 31, 1, 1}, 1));
+  EXPECT_TRUE(refuses({2, 2, kMostVoxelsAlongAxis + 1}, 1));
+  EXPECT_FALSE(refuses({2, 2, kMostVoxelsAlongAxis}, 1));
   EXPECT_TRUE(refuses({8, 8, 8}, 1e300));
   EXPECT_TRUE(refuses({8, 8, 8}, 1e9));
   EXPECT_FALSE(refuses({4096, 4096, 1024}, 1));

@@ -125,8 +125,7 @@ struct Stored<std::uint8_t> {
 };
 
 [[noreturn]] void fail_writing(const std::string& file, const std::string& item) {
-  throw Error(
-      fmt::format("cannot write '{}' of '{}' ({}): is the disk full?", item, file, last_reason()));
+  throw Error(fmt::format("cannot write '{}' of '{}': {}", item, file, last_reason()));
 }
 
 // Returns the access properties of a file: the format whose metadata all have checksums, and no

@@ -33,6 +33,8 @@ struct MrcHeader {
   std::array<double, 3> voxel_size_A{1.0, 1.0, 1.0};
   std::array<double, 3> origin_A{0.0, 0.0, 0.0};  ///< of a part in the whole, as MRC2014 has it
   double min = 0.0, max = 0.0, mean = 0.0, rms = 0.0;
+  /// Sets the statistics to what MRC2014 has for "not determined".
+  void leave_statistics_undetermined() { min = 0.0, max = -1.0, mean = -2.0, rms = -1.0; }
   bool is_volume = false;              ///< ISPG 1; 0 is a stack of images
   std::int64_t sections_a_volume = 0;  ///< written with ISPG 401: a stack of volumes; else 0
   bool is_byte_swapped = false;        ///< written on a machine of the other byte order

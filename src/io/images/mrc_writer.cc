@@ -140,6 +140,7 @@ struct MrcWriter::Impl {
       const double shift = row.mean - header.mean;
       squares += row.squares + shift * shift * static_cast<double>(header.nx);
     }
+    if (!std::isfinite(squares)) return header.leave_statistics_undetermined();
     header.rms = std::sqrt(squares / (num_rows * static_cast<double>(header.nx)));
     const bool has_unwritten_zeros = num_rows_written < static_cast<std::int64_t>(rows.size());
     header.min = has_unwritten_zeros ? std::min(min, 0.0f) : min;

@@ -56,9 +56,8 @@ template <typename Read>
 auto read_in(const fs::path& store, const fs::path& file, const Read& read) {
   return read_record(store / file, read, [&](const std::string& why) {
     return fmt::format(
-        "cannot replace '{}': its '{}' is not as tomofield writes it ({}); move the folder, or "
-        "give "
-        "another name",
+        "cannot replace '{}': its '{}' does not show that tomofield wrote it ({}); move the "
+        "folder, or give another name",
         store.string(), file.string(), why);
   });
 }

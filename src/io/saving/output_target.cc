@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cctype>
 #include <cerrno>
@@ -51,6 +52,18 @@ bool is_temporary_suffix(std::string_view suffix) {
   };
   return dash != std::string_view::npos && is_number(suffix.substr(0, dash)) &&
          is_number(suffix.substr(dash + 1));
+}
+
+// Says whether the disk takes a new file of one block at `target`.
+bool takes_a_block(const fs::path& target) {
+  const std::array<char, 4096> block{};
+  const TemporaryFile probe = create_temporary(target);
+  const bool is_written =
+      ::write(probe.descriptor, block.data(), block.size()) == std::ssize(block) &&
+      ::fsync(probe.descriptor) == 0;
+  ::close(probe.descriptor);
+  ::unlink(probe.path.c_str());
+  return is_written;
 }
 
 }  // namespace
@@ -121,7 +134,7 @@ void require_room(const fs::path& folder, const fs::path& path, std::int64_t byt
   std::error_code error;
   const auto space = fs::space(folder, error);
   if (error || space.available >= static_cast<std::uintmax_t>(bytes)) return;
-  if (space.available == 0) {
+  if (space.available == 0 && takes_a_block(path)) {
     return base::log_warning(
         fmt::format("'{}' needs {} bytes, but its disk has only 0 left", path.string(), bytes));
   }

@@ -35,7 +35,8 @@ std::filesystem::path unused_temporary_name(const std::filesystem::path& target)
 void remove_abandoned(const std::filesystem::path& target);
 
 /// Throws Error if the disk of a folder has less room than the results called `path` need. Some
-/// disks that have room say that they have none at all, and are written with a warning.
+/// disks that have room say that they have none at all: a disk that takes a first block is written
+/// with a warning.
 void require_room(const std::filesystem::path& folder, const std::filesystem::path& path,
                   std::int64_t bytes);
 

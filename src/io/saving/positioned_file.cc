@@ -31,11 +31,12 @@ PositionedFile::PositionedFile(const std::filesystem::path& path, Access access)
   descriptor_ = ::open(path.c_str(), flags | O_CLOEXEC | O_NONBLOCK, 0666);
   if (descriptor_ < 0) throw_system_error("open", path);
   struct stat status {};
-  const bool is_regular = ::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode);
-  if (!is_regular) {
-    close();
-    throw Error(fmt::format("'{}' is not a regular file", path.string()));
-  }
+  const int error = ::fstat(descriptor_, &status) == 0 ? 0 : errno;
+  if (error == 0 && S_ISREG(status.st_mode)) return;
+  ::close(std::exchange(descriptor_, -1));
+  if (error == 0) throw Error(fmt::format("'{}' is not a regular file", path.string()));
+  errno = error;
+  throw_system_error("examine", path);
 }
 
 PositionedFile::~PositionedFile() {

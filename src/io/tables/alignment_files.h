@@ -61,6 +61,7 @@ struct MdocSection {
   std::optional<double> prior_dose;  ///< PriorRecordDose: electrons / Å² before this section
   std::optional<double> dose;        ///< ExposureDose: electrons / Å² of this section; 0: unknown
   std::optional<std::int64_t> time_s;       ///< DateTime, in seconds from some day on
+  int unread_time_line = 0;                 ///< line of a DateTime that cannot be read, or 0
   std::optional<double> rotation_deg;       ///< RotationAngle
   std::optional<double> target_defocus_um;  ///< TargetDefocus: negative under focus
   std::string frame_name;                   ///< SubFramePath without its folders
@@ -107,6 +108,9 @@ std::optional<double> target_underfocus_um(const Mdoc& mdoc);
 struct AcquisitionOrder {
   std::vector<std::size_t> sections;  ///< indices into Mdoc::sections
   bool is_stated = false;  ///< by a key; else sections count as recorded by their numbers
+  /// Why the file's DateTime gives no order, as a phrase with its place. Empty if an order is
+  /// stated, or if no section has a DateTime.
+  std::string fault_of_times;
 };
 
 /// Returns the order by DateTime, else by PriorRecordDose, else by the numbers of the sections. A

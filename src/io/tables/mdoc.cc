@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <map>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -188,6 +189,7 @@ void read_section_entry(const std::filesystem::path& path, const TextLine& line,
     section->dose = require_dose(path, line, entry);
   } else if (entry.key == "DateTime") {
     section->time_s = parse_time(entry.value);
+    section->unread_time_line = section->time_s ? 0 : line.number;
   } else if (entry.key == "RotationAngle") {
     section->rotation_deg = parse_number(entry.value, base::kLargestAngle_deg);
   } else if (entry.key == "TargetDefocus") {
@@ -209,6 +211,29 @@ std::optional<std::vector<std::size_t>> order_by(const std::vector<MdocSection>&
   std::ranges::sort(order, {}, value);
   const bool is_unique = std::ranges::adjacent_find(order, {}, value) == order.end();
   return is_unique ? std::optional(order) : std::nullopt;
+}
+
+// Returns why the times give no order: AcquisitionOrder::fault_of_times.
+std::string fault_of_times(const std::vector<MdocSection>& sections) {
+  std::map<std::int64_t, std::int64_t> section_at;  // by its time
+  std::optional<std::int64_t> untimed;
+  std::string fault;
+  for (const MdocSection& section : sections) {
+    if (section.unread_time_line > 0)
+      return fmt::format("line {}: DateTime is not a date and a time such as 12-Mar-21 15:31:02",
+                         section.unread_time_line);
+    if (!section.time_s) {
+      untimed = untimed.value_or(section.section);
+      continue;
+    }
+    const auto [other, is_new] = section_at.emplace(*section.time_s, section.section);
+    if (!is_new && fault.empty())
+      fault = fmt::format("[ZValue = {}] and [ZValue = {}] have the same DateTime", other->second,
+                          section.section);
+  }
+  if (section_at.empty()) return "";
+  if (untimed) return fmt::format("[ZValue = {}] has no DateTime", *untimed);
+  return fault;
 }
 
 }  // namespace
@@ -267,10 +292,10 @@ std::optional<double> target_underfocus_um(const Mdoc& mdoc) {
 }
 
 AcquisitionOrder acquisition_order(const Mdoc& mdoc) {
-  if (auto by_time = order_by(mdoc.sections, &MdocSection::time_s)) return {*by_time, true};
-  if (auto by_dose = order_by(mdoc.sections, &MdocSection::prior_dose)) return {*by_dose, true};
-  AcquisitionOrder as_numbered;
-  as_numbered.sections.resize(mdoc.sections.size());
+  if (auto by_time = order_by(mdoc.sections, &MdocSection::time_s)) return {*by_time, true, ""};
+  if (auto by_dose = order_by(mdoc.sections, &MdocSection::prior_dose)) return {*by_dose, true, ""};
+  AcquisitionOrder as_numbered{.sections = std::vector<std::size_t>(mdoc.sections.size()),
+                               .fault_of_times = fault_of_times(mdoc.sections)};
   std::iota(as_numbered.sections.begin(), as_numbered.sections.end(), 0);
   return as_numbered;
 }
