@@ -130,6 +130,11 @@ ssize_t write(int file, const void* data, size_t bytes) {
   if (file_fails("write", file)) FAIL(ENOSPC, -1);
   return NEXT(write)(file, data, bytes);
 }
+// The C library writes streams by calls of its own.
+size_t fwrite(const void* data, size_t size, size_t count, FILE* file) {
+  if (file_fails("write", fileno(file))) FAIL(ENOSPC, 0);
+  return NEXT(fwrite)(data, size, count, file);
+}
 #define WRITE_AT(name)                                                     \
   ssize_t name(int file, const void* data, size_t bytes, off_t offset) {   \
     if (file_fails("write", file)) FAIL(ENOSPC, -1);                       \

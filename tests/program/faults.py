@@ -92,9 +92,10 @@ class Sweep:
             with open(os.path.join(self.folder(), name), "wb") as file:
                 file.write(data)
 
-    def run(self, fault, *options):
+    def run(self, fault, *options, below=""):
+        """Runs with a fault in the files whose paths begin with `below`; by default in all."""
         counted = os.path.join(self.scratch, "count")
-        environment = fault.environment(self.library, self.scratch, counted)
+        environment = fault.environment(self.library, below or self.scratch, counted)
         return self.harness.tomofield(*self.command(*options), env=environment)
 
     def count(self, kind, *options):

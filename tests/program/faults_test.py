@@ -59,6 +59,16 @@ def test_no_write_of_a_result_fails_unnoticed(sweep):
         sweep.check(faults.Fault("write", number, "once"), True)
 
 
+def test_each_result_that_cannot_be_written_is_named(sweep):
+    for name in sweep.new:
+        sweep.prepare(True)
+        fault = faults.Fault("write", 1, "from", errno.EIO)
+        ended = sweep.run(fault, "--overwrite", below=os.path.join(sweep.folder(), f".{name}"))
+        sweep.check_end(ended, fault)
+        sweep.check_files(ended, fault, True)
+        assert ended.returncode == 2 and name in ended.stderr, (name, ended)
+
+
 def test_a_killed_run_leaves_whole_files(sweep):
     count = sweep.count("io")
     for i, number in enumerate(faults.moments(count - 1, 6)):
