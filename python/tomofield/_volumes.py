@@ -33,6 +33,8 @@ class Tomogram:
     def __post_init__(self) -> None:
         if is_masked(self.values):
             raise Error("a tomogram has no masked voxels: fill them (numpy.ma.filled)")
+        if (kind := np.asanyarray(self.values).dtype).kind not in "biuf":
+            raise Error(f"a tomogram has real numbers, and these are of type {kind}")
         if np.ndim(self.values) != 3:
             raise Error(f"a tomogram has values [z, y, x], and these have {np.ndim(self.values)} "
                         "dimensions")

@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "base/check.h"
+#include "base/progress.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compact {
@@ -17,7 +18,9 @@ namespace {
 
 using field::LeafShape;
 
-constexpr int kMostBytes = 5;  // of a number of 32 bits, seven a byte
+constexpr int kMostBytes = 5;                       // of a number of 32 bits, seven a byte
+constexpr std::size_t kMostNumbersAByte = 1 << 14;  // of a code: LZMA packs zeros 8,000 times
+constexpr std::ptrdiff_t kNumbersAtOnce = 1 << 20;  // between which a stop is looked for
 
 // The lengths of vectors and matrices and the rank of one mode.
 struct ModeShape {
@@ -115,6 +118,8 @@ std::vector<std::uint8_t> encode(const QuantisedLeaf& leaf) {
 
 QuantisedLeaf decode(std::span<const std::uint8_t> code, const LeafShape& shape) {
   const std::size_t count = count_numbers(shape);
+  if (count / kMostNumbersAByte > code.size())
+    throw Error("the code of a leaf is too short for it");
   QuantisedLeaf leaf{.shape = shape, .numbers = std::vector<std::int32_t>(count)};
   if (count == 0 && code.empty()) return leaf;
   std::vector<std::uint8_t> plain(count * kMostBytes);
@@ -129,6 +134,7 @@ QuantisedLeaf decode(std::span<const std::uint8_t> code, const LeafShape& shape)
     throw Error("the code of a leaf is damaged");
   auto at = plain.begin();
   for (std::int32_t& number : leaf.numbers) {
+    if ((&number - leaf.numbers.data()) % kNumbersAtOnce == 0) base::allow_interruption();
     std::uint32_t bits = 0;
     for (int shift = 0;; shift += 7) {
       if (at == plain.end() || shift >= 7 * kMostBytes)

@@ -100,6 +100,10 @@ TEST(LeafCode, DamageIsFound) {
   field::LeafShape other = leaf.shape;
   ++other.rank_x;
   EXPECT_NE(message_of<Error>([&] { decode(code, other); }).find("ends early"), std::string::npos);
+  field::LeafShape immense = leaf.shape;
+  immense.nx = immense.nz = field::LeafShape::kMaxVertices;
+  immense.rank_y = 100;
+  EXPECT_NE(message_of<Error>([&] { decode(code, immense); }).find("too short"), std::string::npos);
   other.rank_x -= 2;
   EXPECT_NE(message_of<Error>([&] { decode(code, other); }), "");
 }

@@ -337,7 +337,7 @@ constexpr Row kRows[] = {
      .help = "slab: fast, for one tilt axis; ray: any geometry of the views, which are not "
              "resampled"},
     {.key = "fit.ray_samples", .flag = "--ray-samples", MEMBER(options.fit, ray_samples),
-     .group = Group::kResearch, .range = Range::between(0, 1 << 20),
+     .group = Group::kResearch, .range = Range::between(0, 1 << 15),
      .help = "Samples along a leaf's diagonal (with --engine ray). 0: one for each pixel"},
     {.key = "fit.learning_rate", .flag = "--learning-rate", MEMBER(options.fit, learning_rate),
      .group = Group::kResearch, .range = Range::above(0), .automatic = "0.05; 0.035 for --field grid",

@@ -217,6 +217,17 @@ class ModelReader {
     return field::Quadtree(roots, std::move(nodes));
   }
 
+  // Refuses more vertices than the finest field has in a leaf of such a square.
+  void require_possible_sides(const field::Quadtree& tree,
+                              const std::vector<field::LeafShape>& shapes) const {
+    constexpr std::int64_t kMostAPixel = 16;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      const std::int64_t side = tree.leaf(static_cast<int>(i)).square.size;
+      require(std::max(shapes[i].nx, shapes[i].ny) <= kMostAPixel * side + 2,
+              "a leaf has an impossible shape");
+    }
+  }
+
   // Reads the leaves of a tree, whose nodes the file names as well.
   std::vector<field::LeafShape> read_shapes(const StoredGroup& group, const field::Quadtree& tree,
                                             int fewest = 2) const {
@@ -239,6 +250,7 @@ class ModelReader {
     read("rank_x", &field::LeafShape::rank_x, 0);
     read("rank_y", &field::LeafShape::rank_y, 0);
     read("rank_z", &field::LeafShape::rank_z, 0);
+    require_possible_sides(tree, shapes);
     return shapes;
   }
 

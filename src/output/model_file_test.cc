@@ -306,8 +306,9 @@ TEST(ModelFile, RefusesWhatIsConsistentHdf5ButNoSoundModel) {
       {"f['field'].attrs['kind'] = np.bytes_('mesh')", "mesh"},
       {"f['field'].attrs['bias'] = float('inf')", "bias"},
       {"f['field/leaves/nx'][2] = 1", "impossible shape"},
+      {"f['field/leaves/nx'][2] = 8192", "impossible shape"},
       {"f['field/leaves/nz'][2] = 60000", "more parameters"},
-      {"for n in 'nx', 'ny', 'nz': f['field/leaves/' + n][:] = 65536", "more parameters"},
+      {"for n in 'nx', 'ny', 'nz': f['field/leaves/' + n][:] = 200", "more parameters"},
       {"f['geometry'].attrs['thickness'] = 1e300", "geometry"},
       {"f['field'].attrs['thickness'] = 1e300", "thickness"},
       {"f['geometry'].attrs['axis_x'] = 1e300", "geometry"},
@@ -342,7 +343,8 @@ TEST(ModelFile, RefusesLeavesWhoseNumberOfParametersWraps) {
   const ScratchDirectory scratch;
   Model model = uneven_model(FieldKind::kGrid);
   constexpr int kSide = 256;  // 2^16 leaves, which need 2^48 parameters each
-  const field::RootGrid roots{.x0 = -60, .y0 = 0, .cell_size = 16, .columns = kSide, .rows = kSide};
+  const field::RootGrid roots{
+      .x0 = -60, .y0 = 0, .cell_size = 4096, .columns = kSide, .rows = kSide};
   model.field = make_field(
       FieldKind::kGrid,
       field::Quadtree(roots, std::vector<field::Region>(kSide * kSide, field::Region::kInterest)),

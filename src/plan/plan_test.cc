@@ -3,6 +3,7 @@
 #include <string>
 
 #include "base/log.h"
+#include "base/system/memory.h"
 #include "pixel_stack.h"
 #include "plan/plan.h"
 #include "scratch_directory.h"
@@ -115,6 +116,15 @@ TEST_F(Plan, MoreParametersNeedMoreMemory) {
   // The parameters, their gradient and two moments of floats.
   EXPECT_GT(fine.memory_bytes, few);
   EXPECT_GE(fine.memory_bytes, 16 * fine.num_parameters);
+}
+
+TEST_F(Plan, AnImmenseBudgetOfLeavesTakesNoMemoryItself) {
+  options_.field.kind = FieldKind::kVm;
+  options_.field.tree = TreeKind::kAdaptive;
+  options_.field.leaf_budget = 1'000'000'000;
+  const std::string said = testing::message_of<Error>([&] { require_memory(plan()); });
+  EXPECT_NE(said.find("GiB of memory"), std::string::npos) << said;
+  EXPECT_LT(base::peak_memory(), std::size_t{8} << 30);  // a list of so many leaves has 24 GB
 }
 
 TEST_F(Plan, CountsTheLeavesThatTheRayEngineCopies) {

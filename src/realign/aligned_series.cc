@@ -130,6 +130,14 @@ alignment::Alignment align_views(const tilt_series::TiltSeries& series,
   return found;
 }
 
+// Returns the input of an alignment: the views as they were recorded.
+tilt_series::TiltSeriesOptions recorded_input(const options::ReconstructOptions& options) {
+  tilt_series::TiltSeriesOptions recorded = options.input();
+  recorded.resample = false;
+  recorded.even.reset();
+  return recorded;
+}
+
 // Aligns the series.
 alignment::AlignmentRecord align_series(const options::ReconstructOptions& options,
                                         const alignment::AlignmentOrigin& origin,
@@ -137,9 +145,7 @@ alignment::AlignmentRecord align_series(const options::ReconstructOptions& optio
                                         const distributed::Communicator& processes) {
   const base::TraceSpan span("align series");
   const base::Stopwatch running;
-  tilt_series::TiltSeriesOptions recorded = options.input();
-  recorded.resample = false;
-  recorded.even.reset();
+  tilt_series::TiltSeriesOptions recorded = recorded_input(options);
   const tilt_series::TiltSeries series(recorded, processes);
   alignment::require_views(series.views().size());
   const alignment::Alignment found = align_views(series, options, hooks, processes);
@@ -163,6 +169,15 @@ alignment::AlignmentRecord align_series(const options::ReconstructOptions& optio
   return record;
 }
 
+// Returns the sections of the views that an alignment of the series has.
+std::vector<std::int64_t> sections_of(const options::ReconstructOptions& options,
+                                      const distributed::Communicator& processes) {
+  const tilt_series::PlannedSeries series(recorded_input(options), processes);
+  std::vector<std::int64_t> sections;
+  for (const tilt_series::View& view : series.views()) sections.push_back(view.section);
+  return sections;
+}
+
 }  // namespace
 
 bool align_series(options::ReconstructOptions& options, const tune::TuneHooks& hooks,
@@ -173,7 +188,8 @@ bool align_series(options::ReconstructOptions& options, const tune::TuneHooks& h
   alignment::AlignmentRecord record;
   processes.run_collectively([&] { origin = alignment_origin(options); });
   if (options.run.resume && std::filesystem::exists(path)) {
-    processes.run_collectively([&] { record = read_alignment_record(path, origin); });
+    const std::vector<std::int64_t> sections = sections_of(options, processes);
+    processes.run_collectively([&] { record = read_alignment_record(path, origin, sections); });
   } else {
     try {
       record = align_series(options, origin, hooks, processes);

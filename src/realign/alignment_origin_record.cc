@@ -110,11 +110,15 @@ alignment::AlignmentOrigin alignment_origin(const options::ReconstructOptions& o
 }
 
 alignment::AlignmentRecord read_alignment_record(const std::filesystem::path& path,
-                                                 const alignment::AlignmentOrigin& origin) {
+                                                 const alignment::AlignmentOrigin& origin,
+                                                 const std::vector<std::int64_t>& sections) {
   try {
     alignment::AlignmentRecord record = alignment::read_record(path);
     if (const std::string why = alignment::difference_of(record.origin, origin); !why.empty())
       throw Error(why);
+    if (!std::ranges::equal(record.views, sections, {}, &alignment::AlignedView::section))
+      throw Error(fmt::format("its {} views are not the {} of the series", record.views.size(),
+                              sections.size()));
     return record;
   } catch (const std::exception& error) {
     throw Error(

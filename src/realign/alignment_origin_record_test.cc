@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -82,10 +83,17 @@ class AlignmentRecord : public ::testing::Test {
     return made;
   }
 
+  static std::vector<std::int64_t> all_sections() {
+    std::vector<std::int64_t> sections(kNumViews);
+    std::iota(sections.begin(), sections.end(), 0);
+    return sections;
+  }
+
   // Returns why a run does not resume from the record, or "" if it does.
   std::string refusal(const options::ReconstructOptions& options) const {
     const alignment::AlignmentOrigin origin = alignment_origin(options);
-    return testing::message_of<Error>([&] { read_alignment_record(file_, origin); });
+    return testing::message_of<Error>(
+        [&] { read_alignment_record(file_, origin, all_sections()); });
   }
 
   testing::ScratchDirectory scratch_;
@@ -96,11 +104,22 @@ class AlignmentRecord : public ::testing::Test {
 
 TEST_F(AlignmentRecord, IsReadAsItWasWritten) {
   options::ReconstructOptions options = run();
-  const alignment::AlignmentRecord read = read_alignment_record(file_, alignment_origin(options));
+  const alignment::AlignmentRecord read =
+      read_alignment_record(file_, alignment_origin(options), all_sections());
   EXPECT_EQ(alignment::to_json(read), record_);
   apply_alignment(read, options);
   EXPECT_EQ(options.corrections, found().corrections);
   EXPECT_EQ(options.left_out, (std::vector<std::int64_t>{2}));
+}
+
+TEST_F(AlignmentRecord, HasAllViewsOfTheSeries) {
+  for (const int view : {0, 5, kNumViews - 1}) {
+    json cut = record_;
+    cut["views"].erase(static_cast<std::size_t>(view));
+    io::write_json(file_, cut);
+    EXPECT_NE(refusal(run()).find("its 14 views are not the 15 of the series"), std::string::npos)
+        << refusal(run());
+  }
 }
 
 TEST_F(AlignmentRecord, HasAPoseThatCanBe) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/progress.h"
 #include "base/threads/parallel.h"
 #include "fourier/image_transform.h"
 
@@ -54,6 +55,7 @@ void for_each_pixel(std::span<float> image, std::int64_t width, std::uint64_t se
                     std::uint64_t first_stream, const Pixel& pixel) {
   const auto num_rows = static_cast<std::int64_t>(image.size()) / width;
   base::parallel_for("add noise", num_rows, [&](std::int64_t row) {
+    base::allow_interruption();
     base::Random random(seed, first_stream + static_cast<std::uint64_t>(row));
     for (float& value :
          image.subspan(static_cast<std::size_t>(row * width), static_cast<std::size_t>(width)))

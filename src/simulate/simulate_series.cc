@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "base/plausible.h"
 #include "base/statistics.h"
 #include "geometry/raw_from_aligned.h"
 #include "io/images/mrc.h"
@@ -18,6 +20,7 @@
 #include "io/saving/output_folder.h"
 #include "io/saving/output_lock.h"
 #include "io/saving/output_set.h"
+#include "io/saving/output_target.h"
 #include "io/tables/ctf_table.h"
 #include "io/tables/write_alignment.h"
 #include "simulate/cryo/electron_counts.h"
@@ -81,6 +84,18 @@ std::vector<io::OutputLock> claim_files(const OutputFiles& files, const Simulati
     io::check_output_files(files.all(), inputs, overwrite,
                            "give another directory, or --overwrite to replace it");
   });
+}
+
+// Throws Error before the work unless the disk has room for the volume and the stacks.
+void require_disk(const fs::path& directory, const CellOptions& cell, std::size_t num_views,
+                  bool write_truth) {
+  constexpr std::int64_t kStacks = 2, kBytes = 4;  // with noise and without, as floats
+  const base::CheckedSize plane = base::CheckedSize(cell.size_px) * cell.size_px * kBytes;
+  const base::CheckedSize bytes =
+      plane * kStacks * num_views + plane * (write_truth ? cell.thickness_px : 0);
+  fs::path folder = fs::absolute(directory);
+  while (!fs::exists(folder)) folder = folder.parent_path();
+  io::require_room(folder, directory / "truth.mrc", bytes.find().value_or(INT64_MAX));
 }
 
 io::MrcSpec mrc_spec(std::int64_t nx, std::int64_t ny, std::int64_t nz, bool is_volume,
@@ -388,6 +403,7 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
   if (!faults.empty()) throw Error(fmt::format("cannot simulate: {}", fmt::join(faults, "; ")));
   const auto views = plan_views(options);
   const CellOptions cell = cell_options(options, views);
+  require_disk(directory, cell, views.size(), options.write_truth);
   std::optional<CryoSpecimen> specimen;
   if (options.is_physical())
     specimen = make_cryo_specimen(cell, options.voxel_size_A, options.particle_files);

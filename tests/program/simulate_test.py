@@ -509,6 +509,12 @@ def test_existing_files_are_kept_unless_asked():
     assert sorted(os.listdir(series.directory)) == sorted(set(FILES) - {"truth.mrc"})
 
 
+def test_a_disk_without_room_is_found_before_the_work():
+    ended = harness.tomofield("simulate", "immense", "--size", 20000, "--thickness", 20000, timeout=20)
+    assert ended.returncode == 2 and "truth.mrc" in ended.stderr and "its disk" in ended.stderr, ended
+    assert not os.path.exists("immense")
+
+
 def test_bad_options_are_named_and_nothing_is_written():
     directory = os.path.join(harness.SCRATCH, "bad")
     for options, words in (

@@ -16,6 +16,7 @@
 #include "base/threads/parallel.h"
 #include "python_script.h"
 #include "tomofield/error.h"
+#include "warning_catcher.h"
 
 namespace tomofield::io {
 namespace {
@@ -115,6 +116,23 @@ TEST(Mrc, TurnsTheOriginOfImodAround) {
   EXPECT_EQ(imods, (std::array<double, 3>{-50, -40, 0}));
   bytes[152] = 0;
   EXPECT_EQ(MrcReader(scratch.write("none.mrc", bytes)).header().origin_A, spec.origin_A);
+}
+
+TEST(Mrc, HalfFloatsThatDoNotHoldTheValuesAreNamed) {
+  const ScratchDirectory scratch;
+  const auto warning_of = [&](MrcMode mode, float largest) {
+    const testing::WarningCatcher warnings;
+    MrcWriter writer(scratch / "half.mrc", spec_of(2, 1, 1, mode));
+    writer.write_section(0, std::vector<float>{0.0f, -largest});
+    writer.close();
+    return warnings.text();
+  };
+  for (const float fits : {0.0f, 2e-5f, 1.0f, 65504.0f})
+    EXPECT_EQ(warning_of(MrcMode::kFloat16, fits), "") << fits;
+  EXPECT_NE(warning_of(MrcMode::kFloat16, 7e4f).find("end at 65504"), std::string::npos);
+  EXPECT_NE(warning_of(MrcMode::kFloat16, 1e-10f).find("are multiples of 6e-08"),
+            std::string::npos);
+  EXPECT_EQ(warning_of(MrcMode::kFloat32, 1e30f), "");
 }
 
 TEST(Mrc, OtherProgramsReadWhatIsWritten) {

@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "base/check.h"
+#include "base/log.h"
 #include "base/plausible.h"
 #include "base/progress.h"
 #include "base/system/memory.h"
@@ -87,6 +88,7 @@ struct MrcWriter::Impl {
   std::int64_t num_rows_written = 0;
   float min = std::numeric_limits<float>::infinity();
   float max = -std::numeric_limits<float>::infinity();
+  float largest = 0.0f;  // finite magnitude, before it was stored
 
   Impl(const std::filesystem::path& path, const MrcSpec& spec, const distributed::Communicator& all)
       : header(header_of(spec, path.string())),
@@ -108,14 +110,19 @@ struct MrcWriter::Impl {
     });
   }
 
-  void record(std::int64_t first_row, std::int64_t num_rows, std::span<const float> stored) {
+  void record(std::int64_t first_row, std::int64_t num_rows, std::span<const float> stored,
+              std::span<const float> values) {
     const auto width = static_cast<std::size_t>(header.nx);
     std::vector<RowMoments> moments;
     for (std::size_t at = 0; at < stored.size(); at += width) {
       moments.push_back(moments_of(stored.subspan(at, width)));
     }
     const auto [low, high] = std::minmax_element(stored.begin(), stored.end());
+    float largest_here = 0.0f;
+    for (const float value : values)
+      if (std::isfinite(value)) largest_here = std::max(largest_here, std::fabs(value));
     const std::lock_guard lock(mutex);
+    largest = std::max(largest, largest_here);
     std::copy(moments.begin(), moments.end(), rows.begin() + first_row);
     num_rows_written += num_rows;
     min = std::min(min, *low);
@@ -128,6 +135,19 @@ struct MrcWriter::Impl {
     processes.allreduce_sum(std::span(&num_rows_written, 1));
     min = -static_cast<float>(processes.allreduce_max(-static_cast<double>(min)));
     max = static_cast<float>(processes.allreduce_max(static_cast<double>(max)));
+    largest = static_cast<float>(processes.allreduce_max(static_cast<double>(largest)));
+  }
+
+  // Warns of values that floats of 16 bits cut off, or hold in a few steps.
+  void warn_of_half_floats() const {
+    constexpr float kLargest = 65504.0f, kStep = 0x1p-24f, kFewestSteps = 256.0f;
+    const bool is_small = largest > 0.0f && largest < kFewestSteps * kStep;
+    if (header.mode != MrcMode::kFloat16 || (largest <= kLargest && !is_small)) return;
+    base::log_warning(fmt::format(
+        "'{}' has values of up to {:.3g}, and its 16-bit floats {}: write 32-bit floats (--mode 2)",
+        target->path().string(), largest,
+        is_small ? fmt::format("are multiples of {:.1g}", kStep)
+                 : fmt::format("end at {}", kLargest)));
   }
 
   void finish_statistics() {
@@ -195,7 +215,7 @@ void MrcWriter::write_rows(std::int64_t section, std::int64_t first_row, std::in
     impl_->file->write_at(static_cast<std::int64_t>(kMrcHeaderBytes) +
                               file_row * header.nx * static_cast<std::int64_t>(width),
                           raw.data(), raw.size());
-    impl_->record(file_row, count, stored);
+    impl_->record(file_row, count, stored, chunk);
   }
 }
 
@@ -207,6 +227,7 @@ void MrcWriter::close() {
   impl_->processes.run_collectively([&] {
     if (!impl_->processes.is_root()) return;
     impl_->finish_statistics();
+    impl_->warn_of_half_floats();
     const MrcHeaderBytes bytes = encode_mrc_header(impl_->header);
     impl_->file->write_at(0, bytes.data(), bytes.size());
     impl_->file->close();

@@ -17,7 +17,7 @@ namespace tomofield::io {
 namespace {
 
 bool stands_for_nothing(const std::string& value) {
-  return value.empty() || value == "None" || value == "none";
+  return value.empty() || value == "None" || value == "none" || value == "?" || value == ".";
 }
 
 // Words that begin a part of a STAR file, in any case (Hall, J. Chem. Inf. Comput. Sci. 31, 326,

@@ -96,6 +96,19 @@ TEST(StarFile, ReadsTheTextsThatItWrites) {
   }
 }
 
+TEST(StarFile, KeepsSignsOfNoValue) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.star", "data_\nloop_\n_a\n_b\n? .\n\"?\" \"\"\n");
+  const auto read = read_star_file(path);
+  EXPECT_EQ(read.at(0).find(0, "a"), "?");
+  EXPECT_EQ(read.at(0).find(0, "b"), ".");
+  EXPECT_EQ(StarRow(path, read[0], 0).find_number("b"), std::nullopt);
+  const auto again = read_star_file(scratch.write("b.star", star_file_text(read[0])));
+  for (const char* column : {"a", "b"})
+    for (const std::size_t row : {0, 1})
+      EXPECT_EQ(again.at(0).find(row, column), read[0].find(row, column));
+}
+
 TEST(StarFile, RefusesATextThatNoQuotesHold) {
   StarTable table("global", {"a"});
   table.add_row({"x\n;y"});

@@ -13,13 +13,18 @@ namespace cif = gemmi::cif;
 // Removes the underscore that begins the name of every column in a file.
 std::string column_name(const std::string& tag) { return tag.substr(1); }
 
+// Returns the text of a cell. "?" and "." stand for no value in CIF, and are words in RELION.
+std::string text_of(const std::string& cell) {
+  return cif::is_null(cell) ? cell : cif::as_string(cell);
+}
+
 ParsedTable table_of_loop(const std::string& name, const cif::Loop& loop) {
   ParsedTable table{name, {}, {}};
   for (const std::string& tag : loop.tags) table.columns.push_back(column_name(tag));
   for (std::size_t row = 0; row < loop.length(); ++row) {
     std::vector<std::string>& cells = table.rows.emplace_back();
     for (std::size_t column = 0; column < loop.width(); ++column)
-      cells.push_back(cif::as_string(loop.val(row, column)));
+      cells.push_back(text_of(loop.val(row, column)));
   }
   return table;
 }
@@ -32,7 +37,7 @@ void append_tables(const cif::Block& block, std::vector<ParsedTable>& tables) {
     if (item.type == cif::ItemType::Loop) tables.push_back(table_of_loop(name, item.loop));
     if (item.type != cif::ItemType::Pair) continue;
     single.columns.push_back(column_name(item.pair[0]));
-    single.rows.front().push_back(cif::as_string(item.pair[1]));
+    single.rows.front().push_back(text_of(item.pair[1]));
   }
   if (!single.columns.empty()) tables.push_back(std::move(single));
 }
