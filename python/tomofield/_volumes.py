@@ -33,11 +33,12 @@ class Tomogram:
     def __post_init__(self) -> None:
         if is_masked(self.values):
             raise Error("a tomogram has no masked voxels: fill them (numpy.ma.filled)")
-        if (kind := np.asanyarray(self.values).dtype).kind not in "biuf":
-            raise Error(f"a tomogram has real numbers, and these are of type {kind}")
         if np.ndim(self.values) != 3:
             raise Error(f"a tomogram has values [z, y, x], and these have {np.ndim(self.values)} "
                         "dimensions")
+        numbers = np.asanyarray(self.values).dtype
+        if numbers.kind not in "biuf":
+            raise Error(f"a tomogram has real numbers, and these are of type {numbers}")
         size = number_of(self.voxel_size_A, "voxel_size_A")
         object.__setattr__(self, "voxel_size_A", size if size == 0 else _plausible(size))
 

@@ -146,7 +146,7 @@ SENTENCES = (
     (MASKED_ELEMENTS, lambda m: tomofield.write_mrc("x.mrc", MASKED, 1.0)),
     ("float64 has numbers that are too large", lambda m: tomofield.reconstruct(
         np.full((3, 8, 8), 1e300), TILTS, pixel_size_A=1)),
-    ("has real numbers, .* type complex128", lambda m: tomofield.Tomogram(VIEWS + 5j, 1.0)),
+    ("has real numbers, .* type complex64", lambda m: tomofield.Tomogram(VIEWS + 5j, 1.0)),
     ("has real numbers, .* type datetime64", lambda m: tomofield.Tomogram(VIEWS.astype("M8[s]"), 1)),
     ("has real numbers, .* type <U", lambda m: tomofield.Tomogram(VIEWS.astype("U"), 1)),
     ("has real numbers, .* type object", lambda m: tomofield.Tomogram(VIEWS.astype(object), 1)),
