@@ -217,7 +217,7 @@ class ModelReader {
     return field::Quadtree(roots, std::move(nodes));
   }
 
-  // Refuses more vertices than the finest field has in a leaf of such a square.
+  // Refuses more vertices than twice those of the finest field, an eighth of a pixel apart.
   void require_possible_sides(const field::Quadtree& tree,
                               const std::vector<field::LeafShape>& shapes) const {
     constexpr std::int64_t kMostAPixel = 16;

@@ -160,15 +160,17 @@ int steps_an_epoch(const measurement::Measurement& plan, const FitOptions& optio
 }
 
 std::size_t max_parameters(const fit::Domain& domain, const FieldOptions& options, FieldKind kind) {
-  std::vector<field::LeafShape> inside;
-  for (int i = 0; i < domain.tree.num_leaves(); ++i) {
-    if (domain.tree.leaf(i).region == field::Region::kInterest)
-      inside.push_back(domain.shapes[static_cast<std::size_t>(i)]);
-  }
   const std::size_t now = field::count_parameters(kind, domain.shapes);
-  const auto more = options.leaf_budget - static_cast<std::ptrdiff_t>(inside.size());
-  if (options.tree != TreeKind::kAdaptive || more <= 0) return now;
-  const base::CheckedSize of_leaf = field::count_parameters(kind, {inside.front()});
+  if (options.tree != TreeKind::kAdaptive) return now;
+  std::int64_t num_inside = 0;
+  field::LeafShape first_inside;
+  for (int i = 0; i < domain.tree.num_leaves(); ++i) {
+    if (domain.tree.leaf(i).region != field::Region::kInterest) continue;
+    if (num_inside++ == 0) first_inside = domain.shapes[static_cast<std::size_t>(i)];
+  }
+  const std::int64_t more = options.leaf_budget - num_inside;
+  if (more <= 0) return now;
+  const base::CheckedSize of_leaf = field::count_parameters(kind, {first_inside});
   // Copies of this many bytes can still be added up.
   constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max() / 64;
   return static_cast<std::size_t>((of_leaf * more + now).find(kMost).value_or(kMost));

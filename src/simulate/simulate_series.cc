@@ -93,9 +93,7 @@ void require_disk(const fs::path& directory, const CellOptions& cell, std::size_
   const base::CheckedSize plane = base::CheckedSize(cell.size_px) * cell.size_px * kBytes;
   const base::CheckedSize bytes =
       plane * kStacks * num_views + plane * (write_truth ? cell.thickness_px : 0);
-  fs::path folder = fs::absolute(directory);
-  while (!fs::exists(folder)) folder = folder.parent_path();
-  io::require_room(folder, directory / "truth.mrc", bytes.find().value_or(INT64_MAX));
+  io::require_room(directory, directory / "truth.mrc", bytes.find().value_or(INT64_MAX));
 }
 
 io::MrcSpec mrc_spec(std::int64_t nx, std::int64_t ny, std::int64_t nz, bool is_volume,
@@ -403,6 +401,7 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
   if (!faults.empty()) throw Error(fmt::format("cannot simulate: {}", fmt::join(faults, "; ")));
   const auto views = plan_views(options);
   const CellOptions cell = cell_options(options, views);
+  const io::OutputFolder folder(directory);
   require_disk(directory, cell, views.size(), options.write_truth);
   std::optional<CryoSpecimen> specimen;
   if (options.is_physical())
@@ -412,7 +411,6 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
       specimen ? specimen->phantom : cell_phantom.emplace(make_cell_phantom(cell));
   const Phantom reference = options.reference_has_beads ? phantom : without_beads(phantom);
   const OutputFiles files(directory, specimen ? specimen->kinds : std::vector<ParticleKind>());
-  const io::OutputFolder folder(directory);
   const std::vector<io::OutputLock> locks = claim_files(files, options, overwrite);
 
   // Files of an earlier run that this one does not replace would contradict the others.

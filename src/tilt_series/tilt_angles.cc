@@ -71,27 +71,28 @@ std::string describe_steep(const TiltAngles& angles, const std::vector<std::int6
 
 void require_different(const TiltAngles& angles, std::span<const std::int64_t> sections,
                        const io::ImageStack& stack) {
-  constexpr double kLeastSpan_deg = 0.1;  // stages are less exact
-  constexpr double kRadians = 3.2;        // the span of no usual series in degrees
-  constexpr std::ptrdiff_t kFewestViews = 5;
+  constexpr double kLeastSpan_deg = 0.1;       // stages are less exact
+  constexpr double kLeastUsualSpan_deg = 3.2;  // a series in radians spans less
+  constexpr std::size_t kFewestViews = 5;
   if (sections.size() < 2) return;
   const auto [low, high] = std::ranges::minmax(sections, {}, [&](std::int64_t section) {
     return angles.of_section[static_cast<std::size_t>(section)]->value;
   });
   const double lowest = angles.of_section[static_cast<std::size_t>(low)]->value;
   const double highest = angles.of_section[static_cast<std::size_t>(high)]->value;
-  if (highest - lowest >= kLeastSpan_deg) {
-    if (highest - lowest < kRadians && std::ssize(sections) >= kFewestViews)
-      base::log_warning(fmt::format(
-          "'{}': the tilts reach from {:.6g}° to {:.6g}° only: give degrees, if these are radians",
-          angles.source, lowest, highest));
-    return;
+  const double span_deg = highest - lowest;
+  if (span_deg < kLeastSpan_deg) {
+    throw Error(fmt::format(
+        "'{}': the tilts of all {} sections are {:.6g}°{}, which is no tilt series: give {}",
+        angles.source, sections.size(), lowest + 0.0,
+        highest > lowest ? fmt::format(" to {:.6g}°", highest) : "",
+        stack.is_in_memory() ? "the tilt angles" : "the file of the tilt angles with --tlt"));
   }
-  throw Error(fmt::format(
-      "'{}': the tilts of all {} sections are {:.6g}°{}, which is no tilt series: give {}",
-      angles.source, sections.size(), lowest + 0.0,
-      highest > lowest ? fmt::format(" to {:.6g}°", highest) : "",
-      stack.is_in_memory() ? "the tilt angles" : "the file of the tilt angles with --tlt"));
+  if (span_deg < kLeastUsualSpan_deg && sections.size() >= kFewestViews) {
+    base::log_warning(fmt::format(
+        "'{}': the tilts reach from {:.6g}° to {:.6g}° only: give degrees, if these are radians",
+        angles.source, lowest, highest));
+  }
 }
 
 }  // namespace

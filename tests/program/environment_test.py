@@ -184,9 +184,10 @@ def test_a_disk_that_says_it_has_room_ends_in_one_sentence(library, series, tmp_
 
 
 @pytest.fixture(scope="module")
-def large_series():
+def large_series(tmp_path_factory):
     """Returns a stack and its tilts, whose views need a scratch file of more than 1 GiB."""
-    stack, tilts = os.path.abspath("large.mrc"), os.path.abspath("large.tlt")
+    folder = tmp_path_factory.mktemp("large")
+    stack, tilts = os.path.join(folder, "large.mrc"), os.path.join(folder, "large.tlt")
     view = np.random.default_rng(1).integers(0, 100, (4096, 4096)).astype(np.int8)
     harness.write_stack(stack, np.broadcast_to(view, (17, 4096, 4096)))
     np.savetxt(tilts, np.linspace(-48, 48, 17))

@@ -47,6 +47,9 @@ void decode_values(const MrcHeader& header, std::span<std::byte> raw, std::span<
 void encode_values(MrcMode mode, std::span<const float> values, std::span<std::byte> raw,
                    std::span<float> stored);
 
+inline constexpr float kLargestHalf = 65504.0f;   ///< the largest finite number of binary16
+inline constexpr float kSmallestHalf = 0x1p-24f;  ///< of which small numbers are multiples
+
 /// Converts IEEE 754 binary16 bits to float, exactly for every input.
 inline float float_from_half(std::uint16_t half) {
   const std::uint32_t sign = (half & 0x8000u) << 16;
@@ -62,12 +65,11 @@ inline float float_from_half(std::uint16_t half) {
 
 /// Converts to the nearest binary16, ties to even; finite values beyond ±65504 become ±65504.
 inline std::uint16_t half_from_float(float value) {
-  constexpr float kLargest = 65504.0f;
   const auto sign =
       static_cast<std::uint16_t>((std::bit_cast<std::uint32_t>(value) >> 16) & 0x8000u);
   if (std::isnan(value)) return sign | 0x7e00u;
   if (std::isinf(value)) return sign | 0x7c00u;
-  const float magnitude = std::min(std::fabs(value), kLargest);
+  const float magnitude = std::min(std::fabs(value), kLargestHalf);
   if (magnitude < 0x1p-14f) {  // subnormal: a multiple of 2⁻²⁴
     return sign | static_cast<std::uint16_t>(std::lrint(magnitude * 0x1p24f));
   }

@@ -41,6 +41,13 @@ RowMoments moments_of(std::span<const float> row) {
   return moments;
 }
 
+float largest_magnitude(std::span<const float> values) {
+  float largest = 0.0f;
+  for (const float value : values)
+    if (std::isfinite(value)) largest = std::max(largest, std::fabs(value));
+  return largest;
+}
+
 MrcHeader header_of(const MrcSpec& spec, const std::string& name) {
   constexpr std::int64_t kLargest = std::numeric_limits<std::int32_t>::max();
   for (const std::int64_t size : {spec.nx, spec.ny, spec.nz}) {
@@ -88,7 +95,7 @@ struct MrcWriter::Impl {
   std::int64_t num_rows_written = 0;
   float min = std::numeric_limits<float>::infinity();
   float max = -std::numeric_limits<float>::infinity();
-  float largest = 0.0f;  // finite magnitude, before it was stored
+  float largest = 0.0f;  // finite magnitude, before it was stored as a float of 16 bits
 
   Impl(const std::filesystem::path& path, const MrcSpec& spec, const distributed::Communicator& all)
       : header(header_of(spec, path.string())),
@@ -100,7 +107,7 @@ struct MrcWriter::Impl {
       target.emplace(path);
       temporary = target->temporary_path();
       const std::int64_t bytes = expected_file_bytes(header, path.string());
-      require_room(temporary, path, bytes);
+      require_room(folder_of(temporary), path, bytes);
       file.emplace(temporary, PositionedFile::Access::kReadWrite);
       file->resize(bytes);
     });
@@ -118,9 +125,7 @@ struct MrcWriter::Impl {
       moments.push_back(moments_of(stored.subspan(at, width)));
     }
     const auto [low, high] = std::minmax_element(stored.begin(), stored.end());
-    float largest_here = 0.0f;
-    for (const float value : values)
-      if (std::isfinite(value)) largest_here = std::max(largest_here, std::fabs(value));
+    const float largest_here = header.mode == MrcMode::kFloat16 ? largest_magnitude(values) : 0.0f;
     const std::lock_guard lock(mutex);
     largest = std::max(largest, largest_here);
     std::copy(moments.begin(), moments.end(), rows.begin() + first_row);
@@ -140,14 +145,14 @@ struct MrcWriter::Impl {
 
   // Warns of values that floats of 16 bits cut off, or hold in a few steps.
   void warn_of_half_floats() const {
-    constexpr float kLargest = 65504.0f, kStep = 0x1p-24f, kFewestSteps = 256.0f;
-    const bool is_small = largest > 0.0f && largest < kFewestSteps * kStep;
-    if (header.mode != MrcMode::kFloat16 || (largest <= kLargest && !is_small)) return;
+    constexpr float kFewestSteps = 256.0f;
+    const bool is_small = largest > 0.0f && largest < kFewestSteps * kSmallestHalf;
+    if (largest <= kLargestHalf && !is_small) return;
     base::log_warning(fmt::format(
         "'{}' has values of up to {:.3g}, and its 16-bit floats {}: write 32-bit floats (--mode 2)",
         target->path().string(), largest,
-        is_small ? fmt::format("are multiples of {:.1g}", kStep)
-                 : fmt::format("end at {}", kLargest)));
+        is_small ? fmt::format("are multiples of {:.1g}", kSmallestHalf)
+                 : fmt::format("end at {}", kLargestHalf)));
   }
 
   void finish_statistics() {

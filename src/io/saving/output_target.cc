@@ -54,10 +54,10 @@ bool is_temporary_suffix(std::string_view suffix) {
          is_number(suffix.substr(dash + 1));
 }
 
-// Says whether the disk takes a new file of one block at `target`.
-bool takes_a_block(const fs::path& target) {
+// Says whether the disk of a folder takes a new file of one block.
+bool takes_a_block(const fs::path& folder) {
   const std::array<char, 4096> block{};
-  const TemporaryFile probe = create_temporary(target);
+  const TemporaryFile probe = create_temporary(folder / "room");
   const bool is_written =
       ::write(probe.descriptor, block.data(), block.size()) == std::ssize(block) &&
       ::fsync(probe.descriptor) == 0;
@@ -134,7 +134,7 @@ void require_room(const fs::path& folder, const fs::path& path, std::int64_t byt
   std::error_code error;
   const auto space = fs::space(folder, error);
   if (error || space.available >= static_cast<std::uintmax_t>(bytes)) return;
-  if (space.available == 0 && takes_a_block(path)) {
+  if (space.available == 0 && takes_a_block(folder)) {
     return base::log_warning(
         fmt::format("'{}' needs {} bytes, but its disk has only 0 left", path.string(), bytes));
   }

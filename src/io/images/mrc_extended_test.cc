@@ -1,0 +1,150 @@
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "io/images/mrc.h"
+#include "scratch_directory.h"
+
+namespace tomofield::io {
+namespace {
+
+using testing::ScratchDirectory;
+
+// Gives a file an extended header.
+void insert_extended_header(const std::filesystem::path& path, const std::string& extended,
+                            const char* type, std::int16_t section_bytes, std::int16_t flags) {
+  std::string bytes = testing::read_whole_file(path);
+  const auto length = static_cast<std::int32_t>(extended.size());
+  std::memcpy(bytes.data() + 92, &length, 4);
+  std::memcpy(bytes.data() + 104, type, 4);
+  std::memcpy(bytes.data() + 128, &section_bytes, 2);
+  std::memcpy(bytes.data() + 130, &flags, 2);
+  bytes.insert(1024, extended);
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+TEST(Mrc, SeriTiltAngles) {
+  const ScratchDirectory scratch;
+  // Each section holds two shorts: its tilt (flag 1) and its intensity (flag 16).
+  const std::vector<std::int16_t> records{-6000, 7, 0, 8, 4550, 9};
+  const std::string extended(reinterpret_cast<const char*>(records.data()), 12);
+  const auto tilts = [&](const char* type, std::int16_t section_bytes, std::int16_t flags) {
+    MrcWriter(scratch / "a.mrc",
+              MrcSpec{.nx = 2, .ny = 1, .nz = 3, .mode = MrcMode::kInt16, .labels = {}})
+        .close();
+    insert_extended_header(scratch / "a.mrc", extended, type, section_bytes, flags);
+    return MrcReader(scratch / "a.mrc").header().extended_tilt_deg;
+  };
+  const std::vector<double> expected{-60.0, 0.0, 45.5};
+  EXPECT_EQ(tilts("SERI", 4, 17), expected);
+  EXPECT_EQ(tilts("\0\0\0\0", 4, 17), expected);  // from before there were type codes
+  EXPECT_TRUE(tilts("SERI", 4, 16).empty());      // no angles among the flags
+  EXPECT_TRUE(tilts("SERI", 6, 17).empty());      // records longer than the header
+  EXPECT_TRUE(tilts("SERI", -4, 17).empty());
+  EXPECT_TRUE(tilts("CCP4", 4, 17).empty());
+}
+
+// Puts a number into bytes as a file of this machine has it.
+template <typename T>
+void put(std::string& bytes, std::size_t at, T value) {
+  bytes.replace(at, sizeof(T), reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+// Returns the header of a stack of three sections without a pixel size, with this extended header.
+MrcHeader header_with_extended(const std::string& extended, const std::string& type,
+                               std::int16_t first, std::int16_t second,
+                               const std::string& label = "") {
+  const ScratchDirectory scratch;
+  MrcSpec spec{.nx = 2, .ny = 2, .nz = 3, .mode = MrcMode::kInt16, .labels = {}};
+  spec.is_volume = false;
+  spec.voxel_size_A = {1, 1, 1};
+  if (!label.empty()) spec.labels = {label};
+  MrcWriter writer(scratch / "a.mrc", spec);
+  writer.close();
+  insert_extended_header(scratch / "a.mrc", extended, type.data(), first, second);
+  return MrcReader(scratch / "a.mrc").header();
+}
+
+// Returns records of 32 floats a section, after `num_integers` integers, as Xplore3D and UCSF's
+// programs write them: the tilt comes first, the axis and the pixel size are the 11th and the 12th.
+std::string float_records(int num_integers, int num_floats, float axis, float pixel) {
+  std::string extended;
+  for (const float tilt : {-60.0f, 0.0f, 45.5f}) {
+    std::string record(static_cast<std::size_t>(4 * (num_integers + num_floats)), '\0');
+    const auto first = static_cast<std::size_t>(4 * num_integers);
+    put(record, first, tilt);
+    if (num_floats > 10) put(record, first + 40, axis);
+    if (num_floats > 11) put(record, first + 44, pixel);
+    extended += record;
+  }
+  return extended;
+}
+
+TEST(Mrc, FloatRecordsOfExtendedHeaders) {
+  const std::string no_type(4, '\0');
+  const std::vector<double> tilts{-60.0, 0.0, 45.5};
+  const MrcHeader xplore =
+      header_with_extended(float_records(0, 32, -86.25f, 3.5e-10f), no_type, 0, 32, "Fei Company");
+  EXPECT_EQ(xplore.extended_tilt_deg, tilts);
+  EXPECT_NEAR(xplore.voxel_size_A[0], 3.5, 1e-6);
+  EXPECT_EQ(xplore.extended_axis_deg, 86.25);  // IMOD turns the sign of FEI's
+  const MrcHeader agard = header_with_extended(float_records(2, 12, 86.25f, 3.5f), "AGAR", 2, 12);
+  EXPECT_EQ(agard.extended_tilt_deg, tilts);
+  EXPECT_NEAR(agard.voxel_size_A[0], 3.5, 1e-6);
+  EXPECT_EQ(agard.extended_axis_deg, 86.25);
+  const MrcHeader few = header_with_extended(float_records(0, 4, 0, 0), no_type, 0, 4);
+  EXPECT_EQ(few.extended_tilt_deg, tilts);
+  EXPECT_EQ(few.voxel_size_A[0], 1.0);
+  EXPECT_FALSE(few.extended_axis_deg);
+  // Records that are too few, of another type, or without tilts.
+  EXPECT_TRUE(
+      header_with_extended(float_records(0, 12, 0, 0), no_type, 0, 40).extended_tilt_deg.empty());
+  EXPECT_TRUE(
+      header_with_extended(float_records(0, 12, 0, 0), "CCP4", 0, 12).extended_tilt_deg.empty());
+  EXPECT_TRUE(
+      header_with_extended(std::string(144, '\0'), no_type, 0, 12).extended_tilt_deg.empty());
+}
+
+TEST(Mrc, RecordsOfFei1) {
+  constexpr std::uint32_t kTilt = 1u << 7, kAxis = 1u << 12, kPixel = 1u << 14;
+  const auto records = [](std::size_t size, std::uint32_t mask, const char* version) {
+    std::string extended;
+    for (const double tilt : {-60.0, 0.0, 45.5}) {
+      std::string record(size, '\0');
+      put(record, 0, static_cast<std::int32_t>(size));
+      put(record, 8, mask);
+      record.replace(68, std::string(version).size(), version);
+      put(record, 100, tilt);
+      put(record, 140, -86.25);
+      put(record, 156, 3.5e-10);
+      extended += record;
+    }
+    return extended;
+  };
+  for (const std::size_t size : {std::size_t{768}, std::size_t{888}}) {
+    const MrcHeader header = header_with_extended(records(size, kTilt | kAxis | kPixel, "5.1"),
+                                                  size == 768 ? "FEI1" : "FEI2", 0, 0);
+    EXPECT_EQ(header.extended_tilt_deg, (std::vector<double>{-60.0, 0.0, 45.5}));
+    EXPECT_NEAR(header.voxel_size_A[0], 3.5, 1e-6);
+    EXPECT_EQ(header.extended_axis_deg, 86.25);
+  }
+  const MrcHeader masked = header_with_extended(records(768, kTilt, "5.1"), "FEI1", 0, 0);
+  EXPECT_EQ(masked.extended_tilt_deg.size(), 3u);
+  EXPECT_EQ(masked.voxel_size_A[0], 1.0);
+  EXPECT_FALSE(masked.extended_axis_deg);
+  EXPECT_TRUE(
+      header_with_extended(records(768, kPixel, "5.1"), "FEI1", 0, 0).extended_tilt_deg.empty());
+  // Radians, of one version of the software.
+  const MrcHeader radians = header_with_extended(records(768, kTilt, "4.4.0.4981"), "FEI1", 0, 0);
+  EXPECT_TRUE(radians.extended_tilt_deg.empty());  // 60 radians are no tilt
+  const std::string cut = records(768, kTilt, "5.1").substr(0, 2 * 768);
+  EXPECT_TRUE(header_with_extended(cut, "FEI1", 0, 0).extended_tilt_deg.empty());
+}
+
+}  // namespace
+}  // namespace tomofield::io
