@@ -144,10 +144,12 @@ class Listener {
     return [this](const Progress& progress) {
       if (must_stop()) return false;
       const py::gil_scoped_acquire locked;
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      check_signals();
       if (callback_.is_none()) return true;
       const py::object answer = callback_(progress);
-      return answer.is_none() || answer.cast<bool>();
+      const int is_true = answer.is_none() ? 1 : PyObject_IsTrue(answer.ptr());
+      if (is_true < 0) throw py::error_already_set();
+      return is_true == 1;
     };
   }
 
@@ -165,7 +167,10 @@ void log(MessageKind kind, std::string_view text) {
     const py::object logger = py::module_::import("logging").attr("getLogger")("tomofield");
     logger.attr(kind == MessageKind::kWarning ? "warning" : "info")(message);
   } catch (py::error_already_set& error) {
-    error.discard_as_unraisable("tomofield's logger");
+    if (error.matches(PyExc_Exception))
+      error.discard_as_unraisable("tomofield's logger");
+    else
+      keep_for_later(std::current_exception());  // of a handler of signals, such as Ctrl-C
   }
 }
 
@@ -176,14 +181,20 @@ std::pair<option_table::Choices, std::vector<std::string>> open(const std::files
                                                                 const std::string& ignore) {
   Project project = open_project({path, series, ignore});
   for (const std::string& warning : project.warnings) log(MessageKind::kWarning, warning);
+  check_signals();
   return {{std::move(project.files), std::move(project.options)}, std::move(project.warnings)};
 }
 
 bool align_series(const TiltSeries& series, const option_table::Choices& choices,
                   py::object callback) {
   const Listener listener(std::move(callback));
-  const Unlocked unlocked;
-  return align(series, choices.options, listener.callback());
+  bool is_finished = false;
+  {
+    const Unlocked unlocked(Unlocked::Stops::kByCallback);
+    is_finished = align(series, choices.options, listener.callback());
+  }
+  check_signals();
+  return is_finished;
 }
 
 // Returns a volume in memory as numbers and the size of a voxel.
@@ -196,9 +207,10 @@ py::dict run(const TiltSeries& series, const option_table::Choices& choices, py:
   const Listener listener(std::move(callback));
   Reconstruction made;
   {
-    const Unlocked unlocked;
+    const Unlocked unlocked(Unlocked::Stops::kByCallback);
     made = reconstruct(series, choices.options, listener.callback());
   }
+  check_signals();
   py::dict result;
   result["is_finished"] = made.is_finished;
   result["metrics"] = made.metrics;
@@ -215,10 +227,11 @@ py::dict run_baseline(const TiltSeries& series, BaselineMethod method,
   const Listener listener(std::move(callback));
   Baseline made;
   {
-    const Unlocked unlocked;
+    const Unlocked unlocked(Unlocked::Stops::kByCallback);
     made =
         reconstruct_baseline(series, method, choices.options, method_options, listener.callback());
   }
+  check_signals();
   py::dict result;
   result["is_finished"] = made.is_finished;
   result["metrics"] = made.metrics;
@@ -299,7 +312,7 @@ py::array_t<float> sample_points(const Model& model, const py::object& rows) {
   std::vector<Point> list;
   list.reserve(static_cast<std::size_t>(points.shape(0)));
   for (py::ssize_t i = 0; i < points.shape(0); ++i) {
-    if (i % kRowsAtOnce == 0 && PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (i % kRowsAtOnce == 0) check_signals();
     list.push_back({*points.data(i, 0), *points.data(i, 1), *points.data(i, 2)});
   }
   std::vector<float> values;

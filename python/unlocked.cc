@@ -6,7 +6,9 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
+#include <utility>
 
 #include "base/progress.h"
 
@@ -32,6 +34,11 @@ Calls& calls() {
 // A process that was forked has no other threads: what they began in its parent does not end in it.
 pid_t g_own_process = 0;
 
+// The calling thread is in work that may end anywhere. The threads that help it are not.
+thread_local bool t_stops_anywhere = false;
+
+thread_local std::exception_ptr t_raised;  // see keep_for_later()
+
 void wait_for_calls() {
   if (getpid() != g_own_process) return;
   const py::gil_scoped_release released;
@@ -54,7 +61,8 @@ Unlocked::Counted::~Counted() {
   calls().has_changed.notify_all();
 }
 
-Unlocked::Unlocked() = default;
+Unlocked::Unlocked(Stops stops) { t_stops_anywhere = stops == Stops::kAnywhere; }
+Unlocked::~Unlocked() { t_stops_anywhere = false; }
 
 // Ends work that has no callback once the interpreter ends, or by what a handler of signals raises.
 // Only one thread in a tenth of a second takes the interpreter's lock.
@@ -69,6 +77,17 @@ void interrupt() {
           due, (now + std::chrono::milliseconds(100)).time_since_epoch().count()))
     return;
   const py::gil_scoped_acquire locked;
+  check_signals();
+}
+
+void interrupt_loop() {
+  if (t_stops_anywhere) interrupt();
+}
+
+void keep_for_later(std::exception_ptr raised) { t_raised = std::move(raised); }
+
+void check_signals() {
+  if (std::exception_ptr raised = std::exchange(t_raised, nullptr)) std::rethrow_exception(raised);
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
 }
 
@@ -80,6 +99,7 @@ bool must_stop() {
 void wait_at_exit() {
   g_own_process = getpid();
   base::set_interruption(interrupt);
+  base::set_loop_interruption(interrupt_loop);
   py::module_::import("atexit").attr("register")(py::cpp_function(&wait_for_calls));
 }
 

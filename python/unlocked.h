@@ -2,6 +2,8 @@
 
 #include <pybind11/pybind11.h>
 
+#include <exception>
+
 namespace tomofield::python {
 
 /// Gives up the interpreter's lock while C++ works, and takes it back at the end.
@@ -9,11 +11,14 @@ namespace tomofield::python {
 /// A daemon thread may be in C++ when the interpreter ends. Python would end that thread at its
 /// next wish for the lock, through C++ that cannot be unwound, and the process would abort. So the
 /// interpreter waits for all objects of this class before it ends (wait_at_exit()), reconstructions
-/// stop at their next step (must_stop()), sampling at its next part, and none can be made
+/// stop at their next step (must_stop()), other work at its next part, and none can be made
 /// afterwards: the constructor throws Error.
 class Unlocked {
  public:
-  Unlocked();
+  /// Where Ctrl-C and the end of the interpreter stop the work.
+  enum class Stops { kAnywhere, kByCallback };
+  explicit Unlocked(Stops stops = Stops::kAnywhere);
+  ~Unlocked();
   Unlocked(const Unlocked&) = delete;
   Unlocked& operator=(const Unlocked&) = delete;
 
@@ -28,6 +33,12 @@ class Unlocked {
 
 /// Returns true once the interpreter ends.
 bool must_stop();
+
+/// Keeps what a handler of signals has raised where it could not be thrown, for check_signals() of
+/// this thread.
+void keep_for_later(std::exception_ptr raised);
+/// Throws what handlers of signals raise, or have raised. The caller has the interpreter's lock.
+void check_signals();
 
 /// Lets the interpreter wait at its end for what runs in C++, and Ctrl-C stop what has no callback.
 void wait_at_exit();

@@ -64,6 +64,8 @@ class Tomogram:
         y, [z, y] across x."""
         along = _axis_number(axis)
         at = self.shape[along] // 2 if index is None else whole_number_of(index, "index")
+        if not -self.shape[along] <= at < self.shape[along]:
+            raise Error(f"there is no section {at} across {axis}: there are {self.shape[along]}")
         return np.asarray(np.take(self.values, at, axis=along), np.float32)
 
     def write(self, path: Path, *, overwrite: bool = False) -> None:

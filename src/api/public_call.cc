@@ -1,13 +1,15 @@
 #include "api/public_call.h"
 
+#include <chrono>
 #include <mutex>
 
+#include "base/progress.h"
 #include "tomofield/error.h"
 
 namespace tomofield::api {
 namespace {
 
-std::mutex turn;
+std::timed_mutex turn;
 thread_local bool has_turn = false;
 
 }  // namespace
@@ -33,7 +35,8 @@ void Listener::rethrow() const {
 OneAtATime::OneAtATime() {
   if (has_turn)
     throw Error("a callback cannot start another reconstruction: start it when this one is done");
-  turn.lock();
+  constexpr std::chrono::milliseconds kPatience{100};
+  while (!turn.try_lock_for(kPatience)) base::allow_interruption();
   has_turn = true;
 }
 

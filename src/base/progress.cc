@@ -8,18 +8,29 @@
 namespace tomofield::base {
 namespace {
 
-std::function<void()>& interruption() {
-  static std::function<void()> check;
+using Check = std::function<void()>;
+
+Check& interruption() {
+  static Check check;
   return check;
+}
+
+Check& loop_interruption() {
+  static Check check;
+  return check;
+}
+
+void call(const Check& check) {
+  if (check) check();
 }
 
 }  // namespace
 
 void set_interruption(std::function<void()> check) { interruption() = std::move(check); }
+void allow_interruption() { call(interruption()); }
 
-void allow_interruption() {
-  if (interruption()) interruption()();
-}
+void set_loop_interruption(std::function<void()> check) { loop_interruption() = std::move(check); }
+void allow_loop_interruption() { call(loop_interruption()); }
 
 std::string time_text(double seconds) {
   const long s = std::lround(std::max(0.0, seconds));

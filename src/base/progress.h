@@ -49,6 +49,13 @@ void set_interruption(std::function<void()> check);
 /// Calls what was set, if anything.
 void allow_interruption();
 
+/// Sets what every parallel_for calls before each of its bodies, for work that may end anywhere. It
+/// is as set_interruption() says.
+void set_loop_interruption(std::function<void()> check);
+
+/// Calls what was set for loops, if anything.
+void allow_loop_interruption();
+
 /// Returns a duration as "2 h 05 min", "3 min 20 s" or "12 s".
 std::string time_text(double seconds);
 

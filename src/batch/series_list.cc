@@ -154,9 +154,9 @@ Series read_row(const fs::path& path, const CsvRecord& record, const std::vector
   Series series{
       .name = {}, .source = place(path, record.line), .input = {}, .output = {}, .options = {}};
   const auto fail = [&](const std::string& what) { faults.add(series.source + ": " + what); };
-  if (record.fields.size() > columns.size())
-    fail(fmt::format("it has {} fields, and there are {} columns", record.fields.size(),
-                     columns.size()));
+  if (record.fields.size() != columns.size())
+    fail(fmt::format("it has {} field{}, and there are {} columns", record.fields.size(),
+                     record.fields.size() == 1 ? "" : "s", columns.size()));
   const std::size_t count = std::min(record.fields.size(), columns.size());
   for (std::size_t i = 0; i < count; ++i) {
     const std::string& cell = record.fields[i];

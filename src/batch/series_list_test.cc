@@ -53,7 +53,7 @@ class SeriesList : public ::testing::Test {
 
 TEST_F(SeriesList, RowsHaveTheirOwnOptions) {
   const auto all = read("stack,thickness,invert,name,output,center\n" + path("a.mrc") +
-                        ",150,true,first,out/x.mrc,\"3,4\"\n" + path("b.mrc") + ",,no\n");
+                        ",150,true,first,out/x.mrc,\"3,4\"\n" + path("b.mrc") + ",,no,,,\n");
   ASSERT_EQ(all.size(), 2u);
   EXPECT_EQ(all[0].name, "first");
   EXPECT_EQ(all[0].input, path("a.mrc"));
@@ -67,9 +67,9 @@ TEST_F(SeriesList, RowsHaveTheirOwnOptions) {
 
 TEST_F(SeriesList, EveryMistakeIsNamedWithItsLine) {
   const std::string said = refusal("path,invert\n" + path("a.mrc") + ",maybe\n\nnowhere,\n,\n" +
-                                   path("b.mrc") + ",,3\n");
+                                   path("b.mrc") + ",,3\n" + path("a.mrc") + "\n");
   for (const char* part : {"line 2", "'maybe'", "line 4", "'nowhere'", "line 5", "no stack",
-                           "line 6", "3 fields", "4 mistakes"})
+                           "line 6", "3 fields", "line 7", "1 field,", "5 mistakes"})
     EXPECT_NE(said.find(part), std::string::npos) << part << " in " << said;
 }
 

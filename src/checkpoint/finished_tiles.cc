@@ -8,6 +8,7 @@
 
 #include "base/log.h"
 #include "base/trace.h"
+#include "compact/decoded_field.h"
 #include "output/model_file.h"
 #include "output/output_paths.h"
 #include "tomofield/error.h"
@@ -49,7 +50,7 @@ void FinishedTiles::read() {
     throw Error(fmt::format("'{}' was made with --budget {}: give the same", path, text("budget")));
   try {
     tiles_ = tiles_from(text("tiles"), series_.roi.height());
-    compact::require_sound(model.coded->codes);
+    compact::require_sound(*model.coded);
   } catch (const std::exception& error) {
     throw Error(fmt::format("'{}' is damaged: {}", path, error.what()));
   }

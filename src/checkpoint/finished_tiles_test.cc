@@ -99,6 +99,12 @@ TEST_F(FinishedTilesTest, AreRefusedIfTheirFieldIsAnother) {
   EXPECT_NE(refusal().find("thick"), std::string::npos) << refusal();
 }
 
+TEST_F(FinishedTilesTest, AreRefusedIfTheirNumbersAreNoDensities) {
+  std::ranges::fill(model_.coded->codes.step, 1e9);
+  const std::string message = message_of<Error>([&] { read(json::array({tile(0, 64)})); });
+  EXPECT_NE(message.find("no densities"), std::string::npos) << message;
+}
+
 TEST_F(FinishedTilesTest, AreRefusedIfACodeIsDamaged) {
   std::vector<std::uint8_t>& bytes = model_.coded->codes.bytes;
   bytes[bytes.size() / 2] ^= 0xFF;

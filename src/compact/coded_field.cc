@@ -39,11 +39,6 @@ std::span<const std::uint8_t> LeafCodes::code(int leaf) const {
   return std::span(bytes).subspan(first, static_cast<std::size_t>(offset[at + 1]) - first);
 }
 
-void require_sound(const LeafCodes& codes) {
-  for (std::size_t leaf = 0; leaf < codes.shapes.size(); ++leaf)
-    decode(codes.code(static_cast<int>(leaf)), codes.shapes[leaf]);
-}
-
 field::LeafShape with_upper_faces(const field::LeafShape& shape) {
   return {.nx = shape.nx + 1, .ny = shape.ny + 1, .nz = shape.nz};
 }
@@ -104,7 +99,8 @@ CodedField some_bands(const CodedField& field, base::Range bands) {
                             .face_weight = part(all.face_weight, bands),
                             .shapes = part(all.shapes, leaves),
                             .offset = part(all.offset, {leaves.begin, leaves.end + 1}),
-                            .bytes = {}}};
+                            .bytes = {}},
+                  .file = field.file};
   std::vector<std::int64_t>& offset = some.codes.offset;
   some.codes.bytes.assign(all.bytes.begin() + offset.front(), all.bytes.begin() + offset.back());
   const std::int64_t first = offset.front();

@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/range.h"
 #include "field/field.h"
+#include "tomofield/error.h"
 
 namespace tomofield::compact {
 
@@ -29,8 +31,10 @@ struct LeafCodes {
   std::span<const std::uint8_t> code(int leaf) const;
 };
 
-/// Throws Error if the code of a leaf is damaged. Decodes one leaf after the other.
-void require_sound(const LeafCodes& codes);
+/// Is thrown for a code that is damaged, without the name of its file.
+struct DamagedCode : Error {
+  using Error::Error;
+};
 
 /// Stands for a leaf where the field that was compressed has none.
 inline constexpr field::LeafShape kNoLeaf{.nx = 1, .ny = 1, .nz = 2};
@@ -55,6 +59,7 @@ struct CodedField {
   field::Quadtree tree;
   double thickness = 0.0;
   LeafCodes codes;
+  std::string file{};  ///< that it was read from; empty: none
 };
 
 /// Says whether the bands of a field follow those of `lower`.

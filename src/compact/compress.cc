@@ -30,6 +30,9 @@ constexpr std::int64_t kLargestSide = 128;  // px
 // The parts of the error that rounding may add; the ranks leave the rest. The first one makes the
 // file small, and the second one the number of parameters (docs/results/compact.md).
 constexpr double kRoundingForBytes = 0.3, kRoundingForParameters = 0.005;
+// The least mean squared error of rounding, in variances. A budget that has room for all components
+// leaves no error to share, and without rounding the whole numbers of a code would have no end.
+constexpr double kLeastRounding = 1e-6;
 
 // Relates decibels D of PSNR to a mean squared change, k D^p times the variance
 // (docs/results/compact.md).
@@ -249,7 +252,8 @@ class Compression {
   }
 
   double step_of(double rounding_error) const {
-    return error_of_step_ > 0.0 ? std::sqrt(rounding_error / error_of_step_) : 0.0;
+    const double least = kLeastRounding * variance() * volume();
+    return error_of_step_ > 0.0 ? std::sqrt(std::max(rounding_error, least) / error_of_step_) : 0.0;
   }
 
   // Finds the factors of the places that are chosen.

@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <vector>
 
+#include "base/progress.h"
 #include "base/random.h"
 #include "compact/decoded_field.h"
 #include "compact/sample_coded.h"
@@ -111,6 +114,37 @@ TEST(Compress, ParametersAndBytesAreKept) {
     EXPECT_LE(static_cast<double>(made.report.bytes), bytes);
     EXPECT_GT(static_cast<double>(made.report.bytes), 0.8 * bytes);
   }
+}
+
+// A budget that has room for every component makes the closest model there is.
+TEST(Compress, ABudgetAboveTheFieldKeepsTheFieldClosely) {
+  const auto vertices = half_empty_field(4);
+  const double parameters = static_cast<double>(vertices->parameters().size());
+  for (const Budget& budget : {Budget{Budget::Kind::kParameters, 10 * parameters},
+                               {Budget::Kind::kBytes, 2 * parameters},
+                               {Budget::Kind::kBytes, 100 * parameters}}) {
+    const CompressionReport report = compress(*vertices, region_of(4), budget).report;
+    EXPECT_LT(report.decibels, 0.001) << budget.amount;
+    EXPECT_LE(static_cast<double>(report.parameters), 10 * parameters);
+  }
+}
+
+// Compression of a large model takes minutes, and a signal is obeyed in each of its parts.
+TEST(Compress, AStopIsObeyedAtAnyTime) {
+  const auto vertices = half_empty_field(4);
+  std::atomic<int> calls{0}, last{std::numeric_limits<int>::max()};
+  base::set_loop_interruption([&] {
+    if (++calls > last) throw base::StopRequested{};
+  });
+  const auto run = [&] { compress(*vertices, region_of(4), {Budget::Kind::kBytes, 2e4}); };
+  run();
+  const int whole = calls;
+  for (const double part : {0.0, 0.1, 0.3, 0.5, 0.7, 0.9}) {
+    calls = 0;
+    last = static_cast<int>(part * whole);
+    EXPECT_THROW(run(), base::StopRequested) << part;
+  }
+  base::set_loop_interruption({});
 }
 
 TEST(Compress, BytesAreThoseOfTheFile) {

@@ -172,14 +172,21 @@ bool is_inside(const std::array<double, 2>& at, const Rectangle& region) {
   return is_between(at[0], region.x0, region.x1) && is_between(at[1], region.y0, region.y1);
 }
 
+// Returns the densities of a leaf [x, z, y] but those of its upper faces.
+FloatMatrix densities_of(const LeafCodes& codes, int leaf, const field::Quadtree& tree) {
+  const LeafShape& own = codes.shapes[static_cast<std::size_t>(leaf)];
+  const double step = codes.step[static_cast<std::size_t>(tree.band_of_leaf(leaf))];
+  FloatMatrix values =
+      values_of(dequantised_modes(decode(codes.code(leaf), own), step), own.nx, own.ny, own.nz);
+  if (values.allFinite() && base::is_plausible(static_cast<double>(values.cwiseAbs().maxCoeff())))
+    return values;
+  throw DamagedCode("the code of a leaf stands for numbers that are no densities");
+}
+
 // Writes the densities of a leaf but those of its upper faces.
 void decode_leaf(const LeafCodes& codes, int leaf, Field& field) {
   const LeafShape& own = codes.shapes[static_cast<std::size_t>(leaf)];
-  const double step = codes.step[static_cast<std::size_t>(field.tree().band_of_leaf(leaf))];
-  const FloatMatrix values =
-      values_of(dequantised_modes(decode(codes.code(leaf), own), step), own.nx, own.ny, own.nz);
-  if (!values.allFinite() || !base::is_plausible(static_cast<double>(values.cwiseAbs().maxCoeff())))
-    throw Error("the code of a leaf stands for numbers that are no densities");
+  const FloatMatrix values = densities_of(codes, leaf, field.tree());
   const LeafShape& s = field.shape(leaf);
   float* to = field.parameters().data() + field.offset(leaf);
   for (int i = 0; i < own.nx; ++i) {
@@ -232,6 +239,11 @@ double face_jump(const Field& field, const Field& decoded, const std::vector<Lea
 }
 
 }  // namespace
+
+void require_sound(const CodedField& coded) {
+  for (int leaf = 0; leaf < coded.tree.num_leaves(); ++leaf)
+    densities_of(coded.codes, leaf, coded.tree);
+}
 
 std::unique_ptr<Field> decode_field(const CodedField& coded) {
   const LeafCodes& codes = coded.codes;

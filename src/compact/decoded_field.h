@@ -11,9 +11,12 @@ namespace tomofield::compact {
 /// Returns the field of plain vertices (field::FieldKind::kGrid) that the codes stand for:
 /// densities without an activation. A vertex on an upper face gets the density of the leaf that
 /// begins there, interpolated between that leaf's own vertices if these are elsewhere; at the end
-/// of the field, that of the nearest vertex. Throws Error if a code is damaged
-/// or stands for numbers that are no plausible densities.
+/// of the field, that of the nearest vertex. Throws DamagedCode if a code is damaged or stands for
+/// numbers that are no plausible densities.
 std::unique_ptr<field::Field> decode_field(const CodedField& coded);
+
+/// Throws DamagedCode where decode_field() does. Decodes one leaf after the other.
+void require_sound(const CodedField& coded);
 
 /// Returns the weight with which neighbouring vertices across the faces of leaves differ as much,
 /// against neighbours in the middle of leaves, as they do in `original`. `decoded` is what the

@@ -11,6 +11,7 @@
 
 #include "base/check.h"
 #include "base/progress.h"
+#include "compact/coded_field.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compact {
@@ -119,7 +120,7 @@ std::vector<std::uint8_t> encode(const QuantisedLeaf& leaf) {
 QuantisedLeaf decode(std::span<const std::uint8_t> code, const LeafShape& shape) {
   const std::size_t count = count_numbers(shape);
   if (count / kMostNumbersAByte > code.size())
-    throw Error("the code of a leaf is too short for it");
+    throw DamagedCode("the code of a leaf is too short for it");
   QuantisedLeaf leaf{.shape = shape, .numbers = std::vector<std::int32_t>(count)};
   if (count == 0 && code.empty()) return leaf;
   std::vector<std::uint8_t> plain(count * kMostBytes);
@@ -131,21 +132,24 @@ QuantisedLeaf decode(std::span<const std::uint8_t> code, const LeafShape& shape)
   if (result == LZMA_MEM_ERROR) throw std::bad_alloc();
   plain.resize(size);
   if (result != LZMA_OK || read != end || !std::ranges::equal(checksum(plain), code.subspan(end)))
-    throw Error("the code of a leaf is damaged");
+    throw DamagedCode("the code of a leaf is damaged");
   auto at = plain.begin();
   for (std::int32_t& number : leaf.numbers) {
     if ((&number - leaf.numbers.data()) % kNumbersAtOnce == 0) base::allow_interruption();
     std::uint32_t bits = 0;
     for (int shift = 0;; shift += 7) {
       if (at == plain.end() || shift >= 7 * kMostBytes)
-        throw Error("the code of a leaf ends early or has no numbers");
+        throw DamagedCode("the code of a leaf ends early or has no numbers");
       const auto byte = static_cast<std::uint32_t>(*at++);
+      if ((byte & 0x7F) > std::numeric_limits<std::uint32_t>::max() >> shift)
+        throw DamagedCode("the code of a leaf has a number of more than 32 bits");
       bits |= (byte & 0x7F) << shift;
       if (byte < 0x80) break;
     }
     number = static_cast<std::int32_t>((bits >> 1) ^ (0U - (bits & 1U)));
   }
-  if (at != plain.end()) throw Error("the code of a leaf has more numbers than its shape says");
+  if (at != plain.end())
+    throw DamagedCode("the code of a leaf has more numbers than its shape says");
   return leaf;
 }
 

@@ -1,5 +1,7 @@
 #include "compact/sample_coded.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -38,7 +40,12 @@ std::unique_ptr<field::Field> decode_bands(const CodedField& coded, double low, 
   if (bytes > kSmall)
     base::require_memory(bytes, "this part of a compact model",
                          "use a machine with more, or ask for a smaller part");
-  return decode_field(bands);
+  try {
+    return decode_field(bands);
+  } catch (const DamagedCode& damage) {
+    throw Error(
+        fmt::format("'{}' is a damaged model: {}; use another copy", coded.file, damage.what()));
+  }
 }
 
 // Returns how many rows of a box, a multiple of those of a slab, some bands have.

@@ -10,11 +10,13 @@
 #include <utility>
 
 #include "base/log.h"
+#include "io/images/mrc_format.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/ctf_table.h"
 #include "io/tables/mtf_table.h"
 #include "io/tables/view_table.h"
 #include "microscope/exposure.h"
+#include "tilt_series/contradictions.h"
 #include "tilt_series/match_by_tilt.h"
 #include "tilt_series/planned_series.h"
 #include "tomofield/error.h"
@@ -107,6 +109,9 @@ void match_sections(const Sections& sections, io::CtfTable& table) {
     table.views.resize(count, table.views.back());
     return;
   }
+  if (table.views.size() == count && table.tilt_deg.size() == count)
+    tilt_series::warn_of_other_angles(sections.tilt_deg, sections.stack, table.tilt_deg,
+                                      fmt::format("'{}'", table.file.string()));
   const auto rows = rows_of_sections(sections, table.views.size(), table.tilt_deg, table.file,
                                      /*is_ctf=*/true);
   std::vector<std::optional<io::Defocus>> matched(count);
@@ -372,6 +377,11 @@ std::vector<microscope::ViewTransfer> view_transfers(const tilt_series::TiltSeri
   const Sections sections = sections_of(input, series);
   require_pixel_size(input, series, sections.stack);
   const auto ctf = find_ctf(files, options, sections);
+  if (ctf && !options.is_phase_flipped && io::is_in_labels(series.stack().header(), "ctfphaseflip"))
+    base::log_warning(fmt::format(
+        "'{}' went through ctfphaseflip, as its header says, and its views count as not corrected: "
+        "give --ctf-phase-flipped",
+        series.stack().name()));
   const auto exposures = find_exposures(files, options, sections);
   const auto detector = find_detector(files, series);
   if (!ctf && !exposures && !detector) return {};

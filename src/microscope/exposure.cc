@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 #include <utility>
 
 namespace tomofield::microscope {
@@ -128,12 +129,37 @@ bool contradicts_prior_doses(std::span<const std::size_t> order, const io::Mdoc&
   return false;
 }
 
+namespace {
+
+// Returns how DateTime or ExposureDose contradict the PriorRecordDose of all sections, or nothing.
+// Doses between two sections may be more than that of the first, since views are repeated.
+std::string contradiction_of(const io::Mdoc& mdoc, bool has_doses) {
+  const io::AcquisitionOrder by_time = io::acquisition_order(mdoc);
+  if (by_time.is_stated && contradicts_prior_doses(by_time.sections, mdoc))
+    return "PriorRecordDose falls while DateTime rises";
+  if (!has_doses) return "";
+  Sections order(mdoc.sections.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto prior = [&](std::size_t i) { return *mdoc.sections[i].prior_dose; };
+  std::ranges::sort(order, {}, prior);
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    const double rise = prior(order[i]) - prior(order[i - 1]);
+    if (rise > 0.0 && rise < *mdoc.sections[order[i - 1]].dose / 2)
+      return "PriorRecordDose rises by less than ExposureDose";
+  }
+  return "";
+}
+
+}  // namespace
+
 MdocExposures exposures_of(const io::Mdoc& mdoc) {
   const Sections no_prior = sections_without(mdoc, &io::MdocSection::prior_dose);
   const Sections no_dose = sections_without(mdoc, &io::MdocSection::dose);
   std::vector<std::optional<double>> before;
   for (const io::MdocSection& section : mdoc.sections) before.push_back(section.prior_dose);
   if (auto exposures = exposures_from(before)) {
+    if (std::string fault = contradiction_of(mdoc, no_dose.empty()); !fault.empty())
+      return {std::nullopt, std::move(fault)};
     for (std::size_t i = 0; no_dose.empty() && i < exposures->size(); ++i)
       (*exposures)[i].of_view = *mdoc.sections[i].dose;
     return {std::move(exposures), {}};

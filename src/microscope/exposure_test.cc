@@ -94,6 +94,23 @@ MdocExposures without_times(const std::vector<std::string>& entries) {
   return exposures_of(io::read_mdoc(directory.write("a.mdoc", text)));
 }
 
+TEST(ExposuresOfMdoc, AreNotThoseOfAPriorDoseThatIsContradicted) {
+  const auto fault = [](const std::array<std::string, 3>& entries) {
+    const ScratchDirectory directory;
+    return exposures_of(io::read_mdoc(directory.write("a.mdoc", mdoc_text(entries)))).fault;
+  };
+  EXPECT_EQ(fault({"PriorRecordDose = 1", "PriorRecordDose = 4", "PriorRecordDose = 9"}),
+            "PriorRecordDose falls while DateTime rises");
+  const auto with = [&](const std::string& dose) {
+    return fault({"PriorRecordDose = 2\nExposureDose = " + dose,
+                  "PriorRecordDose = 0\nExposureDose = " + dose,
+                  "PriorRecordDose = 1\nExposureDose = " + dose});
+  };
+  EXPECT_EQ(with("1"), "");
+  EXPECT_EQ(with("0.3"), "");  // a view was repeated
+  EXPECT_EQ(with("3"), "PriorRecordDose rises by less than ExposureDose");
+}
+
 TEST(ExposuresOfMdoc, NeverContradictAPriorDoseThatIsKnown) {
   // The order by numbers is not that of recording.
   const MdocExposures unordered =

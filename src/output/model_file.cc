@@ -341,6 +341,7 @@ class ModelReader {
       compact::CodedField coded{read_tree(group.group("tree")), read_thickness(group), {}};
       if (choose) kept = choose(coded.tree);
       coded.codes = read_codes(group, coded.tree);
+      coded.file = path_;
       const std::size_t bytes = compact::decoded_bytes(coded.codes.shapes, base::thread_count());
       require(bytes < compact::kNoMemoryHolds, "its leaves need more numbers than any file holds");
       if (bytes <= most_decoded_bytes) {

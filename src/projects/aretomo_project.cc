@@ -2,7 +2,7 @@
 
 #include "io/tables/alignment_files.h"
 #include "projects/formats.h"
-#include "projects/stack_beside.h"
+#include "projects/stacks.h"
 #include "projects/transfer_files.h"
 #include "tomofield/error.h"
 

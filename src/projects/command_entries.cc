@@ -39,6 +39,13 @@ io::Command find_command(const fs::path& file, std::string_view program) {
                     "(-StandardInput), so they cannot be told: write it as eTomo does",
                     file.string(), found.front().line, program));
   }
+  for (const std::string_view argument : io::split_words(found.front().arguments)) {
+    if (upper_case(argument) == "-STANDARDINPUT" || upper_case(argument) == "-PID") continue;
+    throw Error(
+        fmt::format("'{}', line {}: '{}' stands behind ${}, and only entries on the lines "
+                    "below it are read: write it there",
+                    file.string(), found.front().line, io::quote(argument), program));
+  }
   return std::move(found.front());
 }
 

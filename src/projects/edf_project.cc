@@ -5,9 +5,11 @@
 #include <optional>
 #include <string>
 
+#include "io/images/image_stack.h"
 #include "io/is_file.h"
 #include "io/tables/text_lines.h"
 #include "projects/formats.h"
+#include "projects/stacks.h"
 #include "tomofield/error.h"
 
 namespace tomofield::projects {
@@ -43,12 +45,39 @@ std::optional<fs::path> first_file(const fs::path& stem, std::array<const char*,
   return std::nullopt;
 }
 
+// Sets the tilt axis, as eTomo's dialog of a new dataset has it.
+void set_axis(Project& project, const fs::path& edf, const Entries& entries) {
+  constexpr const char* kEntry = "Setup.ImageRotationA";
+  const std::string text = value_of(entries, kEntry);
+  if (text.empty() || project.ignores(kEntry)) return;
+  const auto axis_deg = io::parse_number(text, base::kLargestAngle_deg / 2);
+  if (!axis_deg)
+    throw Error(
+        fmt::format("'{}': {} is '{}', which is no angle of a tilt axis: correct it, or go "
+                    "on with --ignore {}",
+                    edf.string(), kEntry, io::quote(text), kEntry));
+  project.set("--tilt-axis", fmt::format("{}", *axis_deg), edf, kEntry);
+}
+
+// Sets the pixel size, which eTomo writes in nm, if the stack has none.
+void set_pixel_size(Project& project, const fs::path& edf, const Entries& entries,
+                    const fs::path& stack) {
+  constexpr const char* kEntry = "Setup.PixelSize";
+  constexpr double kAngstroms_in_nm = 10.0;
+  const auto size_nm = io::parse_number(value_of(entries, kEntry));
+  if (size_nm && *size_nm > 0)
+    set_stated_pixel_size(project, {edf, kEntry, kAngstroms_in_nm * *size_nm},
+                          io::open_image_stack(stack)->header().voxel_size_A[0]);
+}
+
 // Sets the files that eTomo names after a dataset, whose alignment may not be there yet.
 void set_dataset(Project& project, const fs::path& edf, const Entries& entries,
                  const std::string& name) {
   constexpr const char* kEntry = "Setup.DatasetName";
   const fs::path stem = edf.parent_path() / name;
-  const auto stack = first_file(stem, std::array{".st", ".mrc", "_raw.mrc"});
+  const std::string ending = value_of(entries, "Setup.RawImageStackExt");
+  const std::string stated = ending.empty() ? ".st" : "." + ending;
+  const auto stack = first_file(stem, std::array{stated.c_str(), ".st", ".mrc", "_raw.mrc"});
   if (!stack) {
     throw Error(fmt::format(
         "'{0}' names the dataset '{1}', and neither tilt.com nor '{1}.st' lies beside it: give a "
@@ -61,13 +90,12 @@ void set_dataset(Project& project, const fs::path& edf, const Entries& entries,
   if (const fs::path xf = stem.string() + ".xf"; is_file(xf)) {
     project.set("--xf", xf.string(), edf, kEntry);
   } else {
-    for (const char* entry : {"Setup.ImageRotation", "Setup.AxisA.ImageRotation"}) {
-      const auto axis_deg = io::parse_number(value_of(entries, entry), base::kLargestAngle_deg / 2);
-      if (!axis_deg) continue;
-      project.set("--tilt-axis", fmt::format("{}", *axis_deg), edf, entry);
-      break;
-    }
+    set_axis(project, edf, entries);
   }
+  constexpr const char* kExcluded = "Setup.AxisA.ExcludeProjections";
+  if (const std::string excluded = value_of(entries, kExcluded); !excluded.empty())
+    project.set("--exclude", excluded, edf, kExcluded);
+  set_pixel_size(project, edf, entries, *stack);
   if (const fs::path xtilt = stem.string() + ".xtilt"; is_file(xtilt))
     project.set("--xtilt", xtilt.string(), edf, kEntry);
 }
@@ -92,6 +120,11 @@ void read_edf_project(Project& project) {
     throw Error(fmt::format(
         "'{}' is of two axes, which are reconstructed one by one: name tilta.com or tiltb.com, or "
         "give a stack itself with its options",
+        edf.string()));
+  }
+  if (value_of(entries, "Setup.ViewType").starts_with("Montage")) {
+    throw Error(fmt::format(
+        "'{}' is of a montage, whose pieces are not read: blend them in eTomo, and give that stack",
         edf.string()));
   }
   set_dataset(project, edf, entries, name);

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include "io/images/image_stack.h"
+#include "io/images/mrc_format.h"
 #include "io/is_file.h"
 #include "tilt_series/series_plan.h"
 #include "tomofield/error.h"
@@ -86,15 +86,6 @@ std::string series_name_of(CommandEntries& tilt) {
   return name;
 }
 
-// Tells whether the labels of a stack say that a program has made it, by its name in lower case.
-bool went_through(const io::MrcHeader& header, std::string_view program) {
-  return std::ranges::any_of(header.labels, [&](std::string label) {
-    std::ranges::transform(label, label.begin(),
-                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return label.find(program) != std::string::npos;
-  });
-}
-
 // Finds the raw files by eTomo's names: NAME.st or NAME.mrc, and NAME.xf.
 std::optional<RawFiles> usual_raw_files(Project& project, CommandEntries& tilt) {
   const auto aligned = tilt.path("InputProjections");
@@ -125,7 +116,7 @@ std::string_view what_hinders_raw(CommandEntries* newst) {
 void warn_of_corrections(Project& project, const fs::path& aligned) {
   const auto stack = io::open_image_stack(aligned);
   for (const std::string_view program : kCorrections) {
-    if (!went_through(stack->header(), program)) continue;
+    if (!io::is_in_labels(stack->header(), program)) continue;
     project.warn(fmt::format(
         "the aligned stack '{}' went through {}, which the raw stack that is read did not: "
         "--ignore TransformFile reads the aligned stack",
@@ -227,7 +218,7 @@ ImodImages read_aligned(Project& project, const NamedFile& aligned, CommandEntri
   images.stack = aligned.path;
   images.num_sections = stack->header().nz;
   images.series_name = series_name_of(tilt);
-  images.is_phase_flipped = went_through(stack->header(), "ctfphaseflip");
+  images.is_phase_flipped = io::is_in_labels(stack->header(), "ctfphaseflip");
   images.bin = images.unit = find_bin(project, tilt, newst, false);
   images.width = images.imod_width = static_cast<double>(stack->header().nx) * images.unit;
   images.height = images.imod_height = static_cast<double>(stack->header().ny) * images.unit;

@@ -9,6 +9,7 @@
 #include <system_error>
 #include <vector>
 
+#include "io/images/image_stack.h"
 #include "io/is_file.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/text_lines.h"
@@ -235,11 +236,12 @@ void read_imod_project(Project& project, const fs::path& tilt_com) {
   set_imod_volume(project, tilt, images);
   set_excluded(project, tilt, images.num_sections);
   set_intensities(project, tilt);
-  const bool has_defocus =
-      set_transfer_files(project, tilt.file().parent_path(), images.series_name);
+  const bool has_defocus = set_imod_transfer(project, tilt.file(), images.series_name);
   if (has_defocus && images.is_phase_flipped)
     project.set("--ctf-phase-flipped", "true", images.stack, "ctfphaseflip");
-  set_imod_optics(project, tilt.file(), has_defocus || project.request().has_transfer);
+  const StackPixels pixels{io::open_image_stack(images.stack)->header().voxel_size_A[0],
+                           images.is_raw ? images.bin : 1.0};
+  set_imod_optics(project, tilt.file(), pixels, has_defocus || project.request().has_transfer);
   tilt.know(kHarmless);
   tilt.warn_about_others();
   if (newst != nullptr) newst->warn_about_others();

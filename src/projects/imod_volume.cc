@@ -70,6 +70,11 @@ void set_roi(Project& project, CommandEntries& tilt, const ImodImages& images, d
   if (const auto slice = tilt.numbers("SLICE", 2, 3)) {
     y = {bottom + slice->at(0), bottom + slice->at(1) + 1};
     entries.emplace_back("SLICE");
+    if (slice->size() > 2 && slice->at(2) != 1)
+      project.warn(
+          fmt::format("'{}': SLICE has steps of {:g} slices, which are not applied: the "
+                      "volume has all slices from {:g} to {:g}",
+                      tilt.file().string(), slice->at(2), slice->at(0), slice->at(1)));
   }
   if (entries.empty()) return;
   const std::string names = join(entries);

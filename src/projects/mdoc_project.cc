@@ -1,9 +1,12 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <vector>
+
 #include "io/tables/alignment_files.h"
 #include "io/tables/mdoc_images.h"
 #include "projects/formats.h"
-#include "projects/stack_beside.h"
+#include "projects/stacks.h"
 #include "projects/transfer_files.h"
 
 namespace tomofield::projects {
@@ -13,9 +16,28 @@ namespace {
 
 // Sets the defocus that the session aimed at, which nobody has measured. It needs a pixel size.
 void set_target_defocus(Project& project, const fs::path& file, const io::Mdoc& mdoc) {
+  const auto target = &io::MdocSection::target_defocus_um;
+  std::vector<double> stated_um;
+  for (const io::MdocSection& section : mdoc.sections)
+    if (section.*target) stated_um.push_back(*(section.*target));
+  if (stated_um.empty() || !mdoc.pixel_spacing_A || project.ignores("TargetDefocus")) return;
+  const auto [lowest_um, highest_um] = std::ranges::minmax(stated_um);
+  if (lowest_um == 0.0 && highest_um == 0.0) return;
   const auto underfocus_um = io::target_underfocus_um(mdoc);
-  if (underfocus_um && mdoc.pixel_spacing_A)
-    project.set("--defocus", fmt::format("{}", *underfocus_um), file, "TargetDefocus");
+  if (!underfocus_um || highest_um > 0.0) {
+    project.warn(fmt::format(
+        "'{}': TargetDefocus is from {} to {} µm, and images are recorded below focus, with less "
+        "than 0: it is not applied (give --defocus, or --ctf)",
+        file.string(), lowest_um, highest_um));
+    return;
+  }
+  constexpr double kSpread_um = 1.0;
+  if (highest_um - lowest_um > kSpread_um)
+    project.warn(fmt::format(
+        "'{}': TargetDefocus is from {} to {} µm, and its median is taken for all views (give "
+        "--ctf with the defocus of each)",
+        file.string(), lowest_um, highest_um));
+  project.set("--defocus", fmt::format("{}", *underfocus_um), file, "TargetDefocus");
 }
 
 }  // namespace

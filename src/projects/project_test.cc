@@ -10,6 +10,7 @@
 #include <string>
 
 #include "expect_parts.h"
+#include "io/images/image_stack.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -352,6 +353,70 @@ TEST(ImodProject, PublicSeriesOfEtomo) {
   EXPECT_EQ(project.warnings(), std::vector<std::string>{});
 }
 
+TEST(ImodProject, OpticsOfTheCommandsAreReadOrRefused) {
+  const ImodFolder imod;
+  imod.write_tilt("THICKNESS 900\n");
+  const auto write = [&](const std::string& entries) {
+    imod.folder.write("ctfcorrection.com", "$ctfphaseflip -StandardInput\n" + entries);
+  };
+  write("Voltage 300\nVoltage 300\n");
+  EXPECT_EQ(imod.values().at("--voltage"), "300");
+  write("Voltage 300\n$ctfphaseflip -StandardInput\nVoltage 200\n");
+  expect_parts(imod.refusal(), {"ctfcorrection.com", "line 4", "Voltage is 200", "300"});
+  write("Voltage 300\n");
+  imod.folder.write("ctfplotter.com", "$ctfplotter -StandardInput\nVoltage 200\n");
+  expect_parts(imod.refusal(), {"ctfplotter.com", "line 2", "Voltage is 200", "ctfcorrection.com"});
+  imod.folder.write("ctfplotter.com", "$ctfplotter -StandardInput\nVoltage 300\n");
+  EXPECT_EQ(imod.refusal(), "");
+  for (const char* bad : {"abc", "0", "-3"}) {
+    write(std::string("Voltage ") + bad + "\n");
+    expect_parts(imod.refusal(), {"ctfcorrection.com", "line 2", "Voltage"});
+    EXPECT_FALSE(imod.values({"Voltage"}).contains("--voltage"));
+  }
+}
+
+TEST(ImodProject, TheDefocusFileOfTheCommandsComesFirst) {
+  const ImodFolder imod;
+  imod.write_tilt("THICKNESS 900\n");
+  const std::string defocus = "1 1 0 0 3000 2\n";
+  imod.folder.write("other.defocus", defocus);
+  imod.folder.write("ctfcorrection.com",
+                    "$ctfphaseflip -StandardInput\nDefocusFile other.defocus\n"
+                    "DegPhaseShift 90\nInvertTiltAngles 0\n");
+  EXPECT_EQ(imod.values().at("--ctf"), (imod.folder / "other.defocus").string());
+  expect_parts(imod.warnings(), {"ctfcorrection.com", "line 3", "DegPhaseShift"});
+  EXPECT_EQ(imod.warnings({"DegPhaseShift"}), "");
+  std::filesystem::rename(imod.folder / "other.defocus", imod.folder / "TS.defocus");
+  EXPECT_EQ(imod.values().at("--ctf"), (imod.folder / "TS.defocus").string());
+}
+
+// The size is in nm, and that of binned pixels of the aligned stack.
+TEST(ImodProject, ThePixelSizeOfTheCommandsIsTakenOrCompared) {
+  const ImodFolder imod;
+  imod.write_newst("BinByFactor 2\n");
+  imod.write_tilt("THICKNESS 900\nIMAGEBINNED 2\n");
+  const double in_header_A = io::open_image_stack(imod.folder / "TS.st")->header().voxel_size_A[0];
+  ASSERT_GT(in_header_A, 1.0);
+  const auto write = [&](double size_nm) {
+    imod.folder.write("ctfcorrection.com",
+                      fmt::format("$ctfphaseflip -StandardInput\nPixelSize {}\n", size_nm));
+  };
+  write(in_header_A / 5);
+  EXPECT_EQ(imod.warnings().find("states pixels of"), std::string::npos) << imod.warnings();
+  write(in_header_A);
+  expect_parts(imod.warnings(), {"ctfcorrection.com", "states pixels of", "PixelSize"});
+  EXPECT_EQ(imod.warnings({"PixelSize"}).find("states pixels of"), std::string::npos);
+  EXPECT_FALSE(imod.values().contains("--pixel-size"));
+}
+
+TEST(ImodProject, WhatStandsBehindACommandIsRefused) {
+  const ImodFolder imod;
+  imod.folder.write("tilt.com", "$tilt -XAXISTILT 3 -StandardInput\nInputProjections TS_ali.mrc\n");
+  expect_parts(imod.refusal(), {"tilt.com", "line 1", "-XAXISTILT"});
+  imod.write_tilt("THICKNESS 900\nSLICE 4 20 4\n");
+  expect_parts(imod.warnings(), {"SLICE", "steps of 4"});
+}
+
 TEST(ProjectFolder, HasOneProject) {
   const ImodFolder imod;
   const auto find = [&] {
@@ -412,6 +477,15 @@ TEST(MdocProject, SetsTheTargetOfTheDefocusWhereNothingMeasuresIt) {
                     target = "[ZValue = 0]\nTiltAngle = 1\nTargetDefocus = -3.5\n";
   EXPECT_EQ(set_by(with_pixels + target), "--defocus 3.5 TargetDefocus");
   EXPECT_EQ(set_by(target), "");
+  const auto warning = [&](const std::string& second) {
+    const auto mdoc = folder.write(
+        "TS.mdoc",
+        with_pixels + target + "[ZValue = 1]\nTiltAngle = 2\nTargetDefocus = " + second + "\n");
+    return fmt::format("{}", fmt::join(read_project({.path = mdoc})->warnings(), "\n"));
+  };
+  EXPECT_EQ(warning("-3.6"), "");
+  expect_parts(warning("-9"), {"TargetDefocus", "from -9 to -3.5", "median"});
+  expect_parts(warning("3"), {"TargetDefocus", "not applied"});
   folder.write("TS_ctf.txt", "1 30000 30000 0 0 0.5 5\n");
   EXPECT_EQ(set_by(with_pixels + target), "--ctf " + (folder / "TS_ctf.txt").string() + " CTF");
 }

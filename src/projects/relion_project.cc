@@ -2,10 +2,13 @@
 
 #include <algorithm>
 
+#include "io/images/image_stack.h"
 #include "io/images/view_images.h"
 #include "io/tables/relion_star.h"
+#include "io/tables/text_lines.h"
 #include "io/tables/view_table.h"
 #include "projects/formats.h"
+#include "projects/stacks.h"
 #include "tomofield/error.h"
 
 namespace tomofield::projects {
@@ -69,6 +72,33 @@ void set_optics(Project& project, const io::RelionTomogram& tomogram, const fs::
   project.set("--defocus-hand", *tomogram.hand < 0.0 ? "1" : "-1", star, "rlnTomoHand");
 }
 
+// Sets the transfer function of the detector that the row of a tomogram names.
+void set_detector(Project& project, const io::RelionTomogram& tomogram, const fs::path& star) {
+  constexpr const char* kEntry = "rlnMtfFileName";
+  if (tomogram.mtf.empty() || project.ignores(kEntry)) return;
+  const fs::path mtf = io::find_listed_file(tomogram.mtf, star);
+  std::error_code absent;
+  if (fs::is_regular_file(mtf, absent))
+    project.set("--mtf", mtf.string(), star, kEntry);
+  else
+    project.warn(
+        fmt::format("'{}', tomogram {}: _{} is '{}', which is not there, so it is not "
+                    "applied (--mtf)",
+                    star.string(), tomogram.name, kEntry, io::quote(tomogram.mtf)));
+}
+
+// Warns if a tomogram's pixels are not those of its images.
+void warn_of_other_pixels(Project& project, const fs::path& views, const fs::path& star,
+                          double stated_A) {
+  const double in_header_A = io::open_image_stack(views)->header().voxel_size_A[0];
+  if (in_header_A == 0.0 || in_header_A == 1.0) return;
+  if (!are_other_pixels(stated_A, in_header_A)) return;
+  project.warn(
+      fmt::format("'{}' states pixels of {:.6g} Å (rlnTomoTiltSeriesPixelSize), and the "
+                  "images of '{}' of {:.6g} Å: the former is taken (--pixel-size)",
+                  star.string(), stated_A, views.string(), in_header_A));
+}
+
 }  // namespace
 
 void read_relion_project(Project& project) {
@@ -82,9 +112,17 @@ void read_relion_project(Project& project) {
   const io::RelionTomogram& tomogram = choose_tomogram(tomograms, project.request());
   const fs::path views = io::find_listed_file(tomogram.tilt_series_star, star);
   project.add_file(views);
-  if (set_views(project, views, star, "rlnTomoTiltSeriesStarFile", tomogram.name))
-    set_optics(project, tomogram, star);
+  const bool has_transfer =
+      set_views(project, views, star, "rlnTomoTiltSeriesStarFile", tomogram.name);
+  if (has_transfer) set_optics(project, tomogram, star);
+  if (has_transfer || project.request().has_transfer) set_detector(project, tomogram, star);
+  if (tomogram.defocus_slope.value_or(1.0) != 1.0)
+    project.warn(
+        fmt::format("'{}', tomogram {}: _rlnTomoDefocusSlope {} is not applied: the "
+                    "defocus changes with the height as it is",
+                    star.string(), tomogram.name, *tomogram.defocus_slope));
   if (tomogram.pixel_size_A) {
+    warn_of_other_pixels(project, views, star, *tomogram.pixel_size_A);
     project.set("--pixel-size", fmt::format("{}", *tomogram.pixel_size_A), star,
                 "rlnTomoTiltSeriesPixelSize");
   }

@@ -14,9 +14,22 @@ namespace tomofield::projects {
 bool set_transfer_files(Project& project, const std::filesystem::path& folder,
                         const std::string& name);
 
+/// Does the same for tilt.com: a DefocusFile of ctfcorrection.com or ctfplotter.com that is there
+/// comes before the names.
+bool set_imod_transfer(Project& project, const std::filesystem::path& tilt_com,
+                       const std::string& name);
+
+/// The pixel size in the header of the stack that is read, and how much larger those of the aligned
+/// stack are, which the command files describe.
+struct StackPixels {
+  double in_header_A = 0.0, bin = 1.0;
+};
+
 /// Sets --voltage, --cs and --amplitude-contrast from ctfplotter.com or ctfcorrection.com beside
 /// tilt.com (ctfplottera.com beside tilta.com). The last two describe a contrast transfer: they are
-/// set if there is one.
-void set_imod_optics(Project& project, const std::filesystem::path& tilt_com, bool has_transfer);
+/// set if there is one. Warns of entries that change it and are not applied. Throws Error for a
+/// value that is none, or that comes twice.
+void set_imod_optics(Project& project, const std::filesystem::path& tilt_com,
+                     const StackPixels& pixels, bool has_transfer);
 
 }  // namespace tomofield::projects

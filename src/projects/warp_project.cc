@@ -19,6 +19,10 @@ void read_warp_project(Project& project) {
                   "AreAnglesInverted");
     }
   }
+  for (const std::string& what : table.ctf_not_applied)
+    if (!io::has_defocus(table))
+      project.warn(
+          fmt::format("'{}' has {}, so its contrast transfer is not applied", path.string(), what));
   if (!table.thickness_A) return;
   const double pixel_A = io::open_image_stack(path)->header().voxel_size_A[0];
   if (pixel_A > 0) {

@@ -164,8 +164,8 @@ void log_halves(const Run& run, const evaluate::Fsc& fsc) {
 // Throws the exception that is being handled, and says that the fits are not lost.
 [[noreturn]] void say_that_models_are_kept(const Run& run) {
   throw_with(fmt::format(
-      "; the finished fits are kept in '{}', '{}' and '{}': the same command with --resume writes "
-      "the results",
+      "; the finished fits are kept in '{}', '{}' and '{}': --resume writes the results without "
+      "another fit",
       run.paths.model.string(), paths_of(run, Half::kEven).model.string(),
       paths_of(run, Half::kOdd).model.string()));
 }

@@ -132,7 +132,7 @@ void write_results(RunResult& results, const ResultFiles& files) {
   }
   if (!is_kept) throw;
   throw_with(fmt::format(
-      "; the finished fit is kept in '{}': the same command with --resume writes the results",
+      "; the finished fit is kept in '{}': --resume writes the results without another fit",
       model.string()));
 }
 

@@ -15,8 +15,6 @@
 namespace tomofield::tilt_series {
 namespace {
 
-using Angles = std::vector<std::optional<double>>;  // [section]
-
 // An alignment that refines tilt angles changes them by less.
 constexpr double kLargestChange_deg = 3.0;
 constexpr double kLargestAxisChange_deg = 10.0;
@@ -37,8 +35,10 @@ double common_offset(const std::vector<double>& differences) {
   return 2 * num_near > std::ssize(differences) ? median : 0.0;
 }
 
-void compare(const TiltAngles& used, const Angles& others, const std::string& other_source) {
-  const Angles angles = values_of(used);
+}  // namespace
+
+void warn_of_other_angles(const Angles& angles, const std::string& source, const Angles& others,
+                          const std::string& other_source) {
   std::vector<double> differences;
   std::vector<std::size_t> sections;
   for (std::size_t i = 0; i < angles.size(); ++i) {
@@ -57,11 +57,8 @@ void compare(const TiltAngles& used, const Angles& others, const std::string& ot
   base::log_warning(fmt::format(
       "the tilt angles of '{}' differ from those of {} in {} of {} sections by more than a common "
       "offset (section {}: {:g}° and {:g}°): are they in the order of the sections?",
-      used.source, other_source, count, differences.size(), first + 1, *angles[first],
-      *others[first]));
+      source, other_source, count, differences.size(), first + 1, *angles[first], *others[first]));
 }
-
-}  // namespace
 
 void warn_of_other_angles(const TiltAngles& used, const std::filesystem::path& path,
                           const io::Mdoc& mdoc, const io::ImageStack& stack) {
@@ -69,7 +66,8 @@ void warn_of_other_angles(const TiltAngles& used, const std::filesystem::path& p
   Angles others;
   for (const io::MdocSection& section : mdoc.sections) others.push_back(section.tilt_deg);
   if (others.size() == used.of_section.size())
-    return compare(used, others, fmt::format("'{}'", path.string()));
+    return warn_of_other_angles(values_of(used), used.source, others,
+                                fmt::format("'{}'", path.string()));
   if (match_by_tilt(values_of(used), others)) return;
   base::log_warning(
       fmt::format("'{}' has {} sections and '{}' {}, and their tilts do not say which belong "
@@ -82,8 +80,29 @@ void warn_of_other_angles(const TiltAngles& used, const io::ImageStack& stack) {
   const auto& extended = stack.header().extended_tilt_deg;
   const bool are_used = used.source == source_of_header(stack);
   if (extended.size() != used.of_section.size() || are_used) return;
-  compare(used, Angles(extended.begin(), extended.end()),
-          fmt::format("the header of '{}'", stack.name()));
+  warn_of_other_angles(values_of(used), used.source, Angles(extended.begin(), extended.end()),
+                       fmt::format("the header of '{}'", stack.name()));
+}
+
+void warn_of_other_angles(const TiltAngles& used, const SectionTable& table) {
+  if (used.source == table.source) return;
+  Angles others;
+  for (const auto& section : table.of_section)
+    others.push_back(section ? std::optional(section->tilt_deg) : std::nullopt);
+  const bool has_any = std::ranges::any_of(
+      others, [](const std::optional<double>& tilt) { return tilt.value_or(0.0) != 0.0; });
+  if (has_any)
+    warn_of_other_angles(values_of(used), used.source, others, fmt::format("'{}'", table.source));
+}
+
+void warn_of_two_axes(const StatedAxis& used, const std::optional<StatedAxis>& other) {
+  if (!other || used.is_given ||
+      angle_between_axes(used.angle_deg, other->angle_deg) <= kLargestAxisChange_deg)
+    return;
+  base::log_warning(
+      fmt::format("{} states a tilt axis of {:.4g}°, and {} of {:.4g}°: the former is "
+                  "taken (give the right one with --tilt-axis)",
+                  used.source, used.angle_deg, other->source, other->angle_deg));
 }
 
 void warn_of_other_axis(const StatedAxis& stated, double aligned_axis_deg,

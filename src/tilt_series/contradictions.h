@@ -2,9 +2,12 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "io/images/image_stack.h"
 #include "io/tables/alignment_files.h"
+#include "tilt_series/section_table.h"
 #include "tilt_series/tilt_angles.h"
 #include "tilt_series/tilt_axis.h"
 
@@ -13,6 +16,12 @@ namespace tomofield::tilt_series {
 // Files of one series may state the same things. These warn where they contradict what is used, as
 // where a list is in another order than the sections of the stack.
 
+using Angles = std::vector<std::optional<double>>;  ///< [section]; none: not stated
+
+/// Warns if angles differ from those of another source by more than a common offset and 3°.
+void warn_of_other_angles(const Angles& angles, const std::string& source, const Angles& others,
+                          const std::string& other_source);
+
 /// Warns if the angles that are used differ from those of the .mdoc by more than a common offset,
 /// or if the .mdoc has another number of sections and they do not match by tilt.
 void warn_of_other_angles(const TiltAngles& used, const std::filesystem::path& path,
@@ -20,6 +29,12 @@ void warn_of_other_angles(const TiltAngles& used, const std::filesystem::path& p
 
 /// Does the same with the angles in the extended header of the stack.
 void warn_of_other_angles(const TiltAngles& used, const io::ImageStack& stack);
+
+/// Does the same with those of the table that aligns the views.
+void warn_of_other_angles(const TiltAngles& used, const SectionTable& table);
+
+/// Warns if another file states another tilt axis than the one that is used.
+void warn_of_two_axes(const StatedAxis& used, const std::optional<StatedAxis>& other);
 
 /// Warns if an alignment turns the views by another axis than the one that a file states.
 void warn_of_other_axis(const StatedAxis& stated, double aligned_axis_deg,

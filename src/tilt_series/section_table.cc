@@ -120,7 +120,9 @@ SectionTable sections_of_views(const io::ViewTable& table, const io::ImageStack&
       sections.of_section.back() = section_of(view, table.centre, stack.header(), pixel_size_A);
   }
   for (const std::string& what : table.not_applied)
-    base::log_warning(fmt::format("'{}': {}", table.file.string(), what));
+    base::log_warning(fmt::format("'{}' has {}, which is not applied", table.file.string(), what));
+  for (const std::string& remark : table.remarks)
+    base::log_warning(fmt::format("'{}': {}", table.file.string(), remark));
   return sections;
 }
 

@@ -195,7 +195,8 @@ void warn_of_other_size(const io::Mdoc& mdoc, const std::filesystem::path& path,
                         const io::ImageStack& stack) {
   constexpr double kCalibration = 0.1;
   const double in_header_A = stack.header().voxel_size_A[0];
-  const double ratio = in_header_A / mdoc.pixel_spacing_A.value_or(in_header_A);
+  if (mdoc.pixel_spacing_A.value_or(0.0) == 0.0) return;  // not known
+  const double ratio = in_header_A / *mdoc.pixel_spacing_A;
   if (std::fabs(ratio / std::max(1.0, std::round(ratio)) - 1.0) < kCalibration) return;
   base::log_warning(
       fmt::format("'{}' states pixels of {:.6g} Å, and '{}' of {:.6g} Å: the latter is taken (give "
@@ -372,6 +373,8 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
   if (options.corrections.empty() && options.left_out.empty()) {
     if (mdoc) warn_of_other_angles(angles, *options.mdoc, *mdoc, stack);
     warn_of_other_angles(angles, stack);
+    if (table) warn_of_other_angles(angles, *table);
+    if (axis && mdoc) warn_of_two_axes(*axis, axis_of_header(stack));
     if (axis && alignment) warn_of_other_axis(*axis, alignment->axis_deg(), options, stack);
     if (options.tilt_axis_deg)
       warn_of_given_axis(*options.tilt_axis_deg, axis_of_files(options, stack, table, mdoc));

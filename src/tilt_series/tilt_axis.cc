@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <string_view>
 
+#include "io/images/mrc_format.h"
 #include "io/tables/text_lines.h"
 #include "option_table/values.h"
 #include "tomofield/error.h"
@@ -18,21 +18,12 @@ namespace {
 constexpr double kVertical_deg = 1.0;
 constexpr std::string_view kIgnoredEntry = "TiltAxisAngle";
 
-std::string lower_case(std::string text) {
-  std::ranges::transform(text, text.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
 // Tells whether the labels say that a program has moved the pixels of the recorded images.
 bool is_transformed(const io::MrcHeader& header) {
   constexpr std::array<std::string_view, 4> kPrograms{"transformed", "blendmont", "mrctaper",
                                                       "tomofield"};
-  return std::ranges::any_of(header.labels, [&](const std::string& label) {
-    const std::string text = lower_case(label);
-    return std::ranges::any_of(
-        kPrograms, [&](std::string_view word) { return text.find(word) != std::string::npos; });
-  });
+  return std::ranges::any_of(kPrograms,
+                             [&](std::string_view word) { return io::is_in_labels(header, word); });
 }
 
 std::optional<double> axis_of_labels(const io::MrcHeader& header) {
@@ -65,6 +56,15 @@ double angle_between_axes(double a_deg, double b_deg) {
   return std::fabs(std::remainder(a_deg - b_deg, 180.0));
 }
 
+std::optional<StatedAxis> axis_of_header(const io::ImageStack& stack) {
+  const io::MrcHeader& header = stack.header();
+  if (is_transformed(header)) return std::nullopt;
+  auto axis_deg = axis_of_labels(header);
+  if (!axis_deg) axis_deg = header.extended_axis_deg;
+  if (!axis_deg) return std::nullopt;
+  return StatedAxis{*axis_deg, fmt::format("the header of '{}'", stack.name())};
+}
+
 std::optional<StatedAxis> find_stated_axis(const TiltSeriesOptions& options,
                                            const io::ImageStack& stack,
                                            const std::optional<io::Mdoc>& mdoc, bool is_aligned) {
@@ -73,14 +73,7 @@ std::optional<StatedAxis> find_stated_axis(const TiltSeriesOptions& options,
     return std::nullopt;
   std::optional<StatedAxis> axis;
   if (mdoc) axis = axis_of_mdoc(*options.mdoc, *mdoc, is_aligned);
-  const io::MrcHeader& header = stack.header();
-  if (!axis && !is_transformed(header)) {
-    const std::string source = fmt::format("the header of '{}'", stack.name());
-    if (const auto axis_deg = axis_of_labels(header))
-      axis = StatedAxis{*axis_deg, source};
-    else if (header.extended_axis_deg)
-      axis = StatedAxis{*header.extended_axis_deg, source};
-  }
+  if (!axis) axis = axis_of_header(stack);
   if (axis) axis->angle_deg = std::remainder(axis->angle_deg, 360.0);
   return axis;
 }

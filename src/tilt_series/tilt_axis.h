@@ -9,6 +9,10 @@
 
 namespace tomofield::tilt_series {
 
+/// Returns the axis that the header of a stack states: SerialEM's title among its labels, else its
+/// extended header. A stack that a program has transformed states none.
+std::optional<StatedAxis> axis_of_header(const io::ImageStack& stack);
+
 /// Returns the axis by the first of: --tilt-axis, the .mdoc, SerialEM's title among the labels of
 /// the stack, the stack's extended header. The labels of a stack that a program has transformed
 /// (newstack with an .xf file, blendmont) tell of the raw one, and so does its extended header:

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import signal
 import subprocess
 
 import mrcfile
@@ -551,3 +552,24 @@ def test_options_that_do_not_fit_are_refused():
     assert mrcfile.read(kept).shape == volume.shape
     tiny = run(save("tiny.mrc", volume[:2, :4, :9]))
     assert tiny.returncode == 2 and "--foreground" in tiny.stderr, tiny
+
+
+def test_a_stopped_comparison_leaves_nothing(tmp_path):
+    rng = np.random.default_rng(3)
+    volume = save("large.mrc", rng.normal(size=(96, 160, 160)))
+    results = tmp_path / "results"
+    results.mkdir()
+    files = [results / name for name in ("f.csv", "f.png", "j.json")]
+    for delay in (0.05, 0.2, 0.5):
+        running = harness.start("evaluate", volume, volume, "--fsc", volume, "--fsc-csv", files[0],
+                                "--fsc-picture", files[1], "--json", files[2], "--overwrite")
+        try:
+            _, said = running.communicate(timeout=delay)
+        except subprocess.TimeoutExpired:
+            running.send_signal(signal.SIGTERM)
+            _, said = running.communicate(timeout=60)
+        assert running.returncode in (0, 128 + signal.SIGTERM), said
+        if running.returncode:
+            assert "stopped; nothing was written" in said, said
+        left = set(os.listdir(results))
+        assert left in (set(), {file.name for file in files}), left

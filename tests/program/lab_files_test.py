@@ -6,6 +6,7 @@ import json
 import os
 import re
 
+import mrcfile
 import numpy as np
 import pytest
 
@@ -333,12 +334,19 @@ def test_files_are_found_beside_a_folder_that_was_moved():
 def test_a_dataset_of_etomo():
     folder = write_series("dataset", 85.3, stack="TS_01.st")
     edf = write(folder, "TS_01.edf", "#Wed Jan 01\nSetup.DatasetName=TS_01\nSetup.AxisType=Single Axis\n"
-                "Setup.ImageRotation=85.3\n")
+                "Setup.ImageRotationA=85.3\nSetup.PixelSize=1.0\nSetup.ViewType=Single View\n")
     words = ["TS_01.edf", "--thickness", 24]
     assert distances(back_projection(folder, *words)).max() < 0.5
     expect(harness.succeed("info", ".", cwd=folder).stdout, "--tilt-axis 85.3 from", "TS_01.rawtlt")
+    edf_text = "Setup.DatasetName=TS_01\nSetup.AxisType=Single Axis\n"
+    write(folder, "TS_01.edf", edf_text + "Setup.ImageRotationA=83,9\n")
+    expect(dry(folder, "TS_01.edf", status=2), "Setup.ImageRotationA", "83,9")
+    write(folder, "TS_01.edf", edf_text + "Setup.ViewType=Montage\n")
+    expect(dry(folder, "TS_01.edf", status=2), "montage")
     write(folder, "TS_01.xf", transforms(85.3))
+    write(folder, "TS_01.edf", edf_text + "Setup.AxisA.ExcludeProjections=3,5-6\nSetup.PixelSize=0.5\n")
     expect(harness.succeed("info", ".", cwd=folder).stdout, "--xf ./TS_01.xf")
+    expect(dry(folder, "TS_01.edf"), "--exclude 3,5-6", "states pixels of 5 Å")
     write(folder, "TS_01.edf", "Setup.DatasetName=TS_01\nSetup.AxisType=Dual Axis\n")
     expect(dry(folder, "TS_01.edf", status=2), "two axes", "tilta.com")
     os.remove(os.path.join(folder, "TS_01.st"))
@@ -559,3 +567,39 @@ def test_a_dry_run_needs_no_output():
                                cwd=folder)
     assert result.returncode == 2
     assert re.search("--output is required", result.stderr)
+
+
+def test_a_table_in_another_order_than_the_views_is_named():
+    """The angles of a .defocus, and those of an .aln beside --tlt, belong to other views."""
+    folder = write_series("other_order")
+    defocus = "".join(f"{i + 1} {i + 1} {-tilt} {-tilt} {3000 + 10 * i}{' 2' if i == 0 else ''}\n"
+                      for i, tilt in enumerate(TILTS))
+    write(folder, "TS.defocus", defocus)
+    short = ["--thickness", 24, "--epochs", 1, "--coarse-epochs", 0, "--tv", 5, "--tv-penalty", "smooth",
+             "--prior", "tv", "--pixel-size", 10, "--overwrite", "-o", "out.mrc"]
+    said = harness.succeed("reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--ctf", "TS.defocus",
+                           *short, cwd=folder)
+    expect(said.stderr, "the tilt angles of", "'TS.defocus'", "order of the sections")
+    rows = "".join(f"{i + 1} 0 1 0 0 1 1 1 0 {-tilt}\n" for i, tilt in enumerate(TILTS))
+    write(folder, "TS.aln", f"# RawSize = 72 56 {len(TILTS)}\n# NumPatches = 0\n" + rows)
+    said = dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--aln", "TS.aln")
+    expect(said, "the tilt angles of", "'TS.aln'", "order of the sections")
+
+
+def test_another_axis_in_the_header_is_named():
+    folder = write_series("two_axes")
+    with mrcfile.open(os.path.join(folder, "TS_01.mrc"), "r+") as file:
+        file.header.label[0], file.header.nlabl = "Tilt axis angle = 85.3, binning = 1", 1
+    write(folder, "TS_01.mdoc", mdoc_text(head="[T = Tilt axis angle = 0.2, binning = 1]\n"))
+    expect(dry(folder, "TS_01.mrc", "--mdoc", "TS_01.mdoc"), "85.3", "--tilt-axis")
+
+
+def test_a_stack_that_was_phase_flipped_is_named():
+    folder = write_series("flipped")
+    with mrcfile.open(os.path.join(folder, "TS_01.mrc"), "r+") as file:
+        file.header.label[0], file.header.nlabl = "ctfPhaseFlip: CTF correction", 1
+    words = ["reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--defocus", 3, "--thickness", 24,
+             "--epochs", 1, "--coarse-epochs", 0, "--tv", 5, "--tv-penalty", "smooth", "--prior", "tv",
+             "--overwrite", "-o", "out.mrc"]
+    expect(harness.succeed(*words, cwd=folder).stderr, "ctfphaseflip", "--ctf-phase-flipped")
+    assert "ctfphaseflip" not in harness.succeed(*words, "--ctf-phase-flipped", cwd=folder).stderr

@@ -194,7 +194,7 @@ def aretomo_place(bead, view):
 
 def write_aln(folder, with_patches=True):
     text = (f"# AreTomo Alignment / Priims bprmMn\n# RawSize = {WIDTH} {HEIGHT} {len(TILTS)}\n"
-            f"# NumPatches = {len(PATCHES)}\n"
+            f"# NumPatches = {len(PATCHES) if with_patches else 0}\n"
             "# SEC     ROT         GMAG       TX          TY      SMEAN     SFIT    SCALE     BASE     "
             "TILT\n")
     for i, tilt in enumerate(TILTS):

@@ -3,6 +3,7 @@
 import _thread
 import inspect
 import json
+import logging
 import multiprocessing
 import os
 import pathlib
@@ -10,6 +11,7 @@ import re
 import subprocess
 import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -112,6 +114,56 @@ def test_ctrl_c_stops_it_and_leaves_a_checkpoint(series, quick, tmp_path):
                               progress=interrupt, output=tmp_path / "t.mrc")
     assert len(steps) == 3
     assert (tmp_path / "t.h5").exists() and not (tmp_path / "t.mrc").exists()
+
+
+def test_ctrl_c_is_obeyed_while_something_is_logged(series, quick):
+    """A handler of signals may raise inside the logger, whose other errors are ignored."""
+    class Interrupting(logging.Handler):
+        def emit(self, record):
+            _thread.interrupt_main()
+            time.sleep(0)  # the handler of the signal runs between two instructions of Python
+    handler, logger, steps = Interrupting(), logging.getLogger("tomofield"), []
+    level = logger.level
+    logger.addHandler(handler)
+    logger.setLevel("INFO")
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            tomofield.reconstruct(series.views, series.tilt_deg, **{**quick, "epochs": 50},
+                                  progress=steps.append)
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(level)
+    assert len(steps) < 3
+
+
+def test_ctrl_c_is_obeyed_while_another_thread_reconstructs(series, quick):
+    has_begun, is_over = threading.Event(), threading.Event()
+
+    def other():
+        tomofield.reconstruct(series.views, series.tilt_deg, **{**quick, "epochs": 5000},
+                              progress=lambda p: has_begun.set() or not is_over.is_set())
+    thread = threading.Thread(target=other)
+    thread.start()
+    has_begun.wait()
+    timer = threading.Timer(0.5, _thread.interrupt_main)
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            tomofield.reconstruct(series.views, series.tilt_deg, **quick)
+        assert thread.is_alive()
+    finally:
+        is_over.set()
+        thread.join()
+        timer.join()
+
+
+def test_any_answer_of_a_callback_counts_as_true_or_false(series, quick):
+    for answer, is_finished in (([], False), ([1], True), ("", False), (0, False), (None, True)):
+        made = tomofield.reconstruct(series.views, series.tilt_deg, **quick, progress=lambda p: answer)
+        assert made.is_finished == is_finished, answer
+    with pytest.raises(ValueError, match="ambiguous"):
+        tomofield.reconstruct(series.views, series.tilt_deg, **quick,
+                              progress=lambda p: np.array([1, 2]))
 
 
 def test_halves_are_files(series, quick, tmp_path):

@@ -42,6 +42,9 @@ def test_numpy_takes_a_tomogram_for_its_array(made):
     np.testing.assert_array_equal(tomogram.section("y", 5), tomogram.values[:, 5])
     with pytest.raises(tomofield.Error, match="one of 'x', 'y', 'z', not 'w'"):
         tomogram.section("w")
+    for index in (33, -34, 2**63, 10**400):
+        with pytest.raises(tomofield.Error, match="there is no section"):
+            tomogram.section("x", index)
 
 
 def test_notebooks_show_the_middle_section(made):

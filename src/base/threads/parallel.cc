@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/progress.h"
 #include "base/system/processors.h"
 #include "base/threads/worker_threads.h"
 #include "base/trace.h"
@@ -158,6 +159,7 @@ void detail::run_loop(const char* what, std::int64_t count, void (*call)(void*, 
   TraceLoop loop(what, count);
   void* const context = thread_context();
   const auto run_index = [&](std::int64_t i) {
+    allow_loop_interruption();
     const ContextScope scope(context);
     loop.run_task(i, thread_index(), [&] { call(body, i); });
   };

@@ -34,7 +34,8 @@ void run_loop(const char* what, std::int64_t count, void (*call)(void*, std::int
 /// else to do join in, and a thread that waits for its inner loop works on that loop alone, so that
 /// what it holds is never needed twice. Threads that have nothing to do sleep. If bodies throw,
 /// some others may not be called, and the first exception is thrown again after all threads have
-/// left the loop. Results must not depend on which thread runs an index.
+/// left the loop. Bodies are not called once a stop was asked for (set_loop_interruption()).
+/// Results must not depend on which thread runs an index.
 template <typename Body>
 void parallel_for(const char* what, std::int64_t count, Body&& body) {
   using Plain = std::remove_reference_t<Body>;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "base/aligned_buffer.h"
+#include "base/progress.h"
 #include "base/system/processors.h"
 
 namespace tomofield::base {
@@ -41,6 +42,24 @@ TEST_P(ParallelFor, ThreadsAreNumberedBelowTheCount) {
   parallel_for("test", 500,
                [&](std::int64_t) { wrong += thread_index() < 0 || thread_index() >= GetParam(); });
   EXPECT_EQ(wrong.load(), 0);
+}
+
+TEST_P(ParallelFor, AStopEndsALoopBeforeItsNextBody) {
+  std::atomic<bool> is_asked{false};
+  std::atomic<int> visits{0};
+  set_loop_interruption([&] {
+    if (is_asked) throw StopRequested{};
+  });
+  const auto run = [&] {
+    parallel_for("test", 1000, [&](std::int64_t) {
+      if (++visits == 10) is_asked = true;
+    });
+  };
+  EXPECT_THROW(run(), StopRequested);
+  EXPECT_LT(visits.load(), 10 + GetParam());
+  set_loop_interruption({});
+  is_asked = false;
+  EXPECT_NO_THROW(run());
 }
 
 TEST_P(ParallelFor, RethrowsWhatABodyThrows) {

@@ -216,7 +216,7 @@ void add_evaluate_command(CLI::App& program) {
   add_evaluate_options(*command, *arguments);
   add_common_options(*command);
   add_help_all(*command);
-  command->callback([arguments] { run_evaluate(*arguments); });
+  command->callback([arguments] { run_stoppable([&] { run_evaluate(*arguments); }); });
 }
 
 }  // namespace tomofield::cli

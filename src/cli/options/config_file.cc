@@ -124,7 +124,10 @@ class Entry {
 
  private:
   std::string text_of(const toml::node& node) const {
-    if (const auto text = node.value_exact<std::string>()) return decoded(*text);
+    if (const auto text = node.value_exact<std::string>()) {
+      if (text->find('\0') != std::string::npos) fail("has a character NUL, which no value has");
+      return decoded(*text);
+    }
     if (const auto integer = node.value_exact<std::int64_t>()) return fmt::format("{}", *integer);
     if (const auto number = node.value_exact<double>()) return fmt::format("{}", *number);
     fail("must be a number, a text, true or false, or an array of numbers or texts");

@@ -76,9 +76,11 @@ void stop_on_signals(bool is_job) {
 
 void run_stoppable(const std::function<void()>& run) {
   stop_on_signals();
-  base::set_interruption([] {
+  const auto stop = [] {
     if (stop_was_requested()) throw base::StopRequested{};
-  });
+  };
+  base::set_interruption(stop);
+  base::set_loop_interruption(stop);
   try {
     run();
   } catch (const base::StopRequested&) {

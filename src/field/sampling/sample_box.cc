@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "base/check.h"
+#include "base/plausible.h"
 #include "base/progress.h"
 #include "base/system/memory.h"
 #include "base/threads/parallel.h"
@@ -116,7 +117,11 @@ void sample_rotated(const Field& field, const OrientedBox& box, base::Range some
 }  // namespace
 
 Rotation rotation_from_euler(double rot_deg, double tilt_deg, double psi_deg) {
-  constexpr double kDegree = std::numbers::pi / 180.0;
+  constexpr double kDegree = std::numbers::pi / 180.0, kLargest_deg = 1e5;
+  for (const double angle_deg : {rot_deg, tilt_deg, psi_deg})
+    if (!base::is_plausible(angle_deg, kLargest_deg))
+      throw Error(fmt::format("a box cannot be turned by {}°: give Euler angles from -{:g} to {:g}",
+                              angle_deg, kLargest_deg, kLargest_deg));
   const double ca = std::cos(rot_deg * kDegree), sa = std::sin(rot_deg * kDegree);
   const double cb = std::cos(tilt_deg * kDegree), sb = std::sin(tilt_deg * kDegree);
   const double cg = std::cos(psi_deg * kDegree), sg = std::sin(psi_deg * kDegree);

@@ -18,7 +18,8 @@ inline constexpr Rotation kNoRotation{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 
 /// Returns RELION's matrix of the Euler angles rlnAngleRot, rlnAngleTilt, rlnAnglePsi (ZYZ), in
 /// degrees. It turns a particle's reference into the tomogram, so a box rotated by a particle's
-/// angles shows the particle in the orientation of the reference.
+/// angles shows the particle in the orientation of the reference. Throws Error for angles that are
+/// not finite or beyond ± 1e5.
 Rotation rotation_from_euler(double rot_deg, double tilt_deg, double psi_deg);
 
 /// A box of cubic voxels anywhere in a field, like the public SampleBox but with its rotation as a

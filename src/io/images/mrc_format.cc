@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -51,6 +52,7 @@ constexpr std::size_t kLabelBytes = 80;
 constexpr int kMaxLabels = 10;
 constexpr std::int32_t kImodStampValue = 1146047817;
 constexpr std::int32_t kImodSignedBytes = 1;
+constexpr std::int32_t kImodPacked = 16;         // two values of 4 bits in a byte
 constexpr std::int32_t kImodOriginInverted = 4;  // ORIGIN has the sign of MRC2014
 
 // Reads numbers of either byte order from the header.
@@ -126,6 +128,18 @@ void require_axis_order(const Fields& fields, const std::string& name) {
       name, axes[0], axes[1], axes[2]));
 }
 
+// IMOD states values of 4 bits by a flag of mode 0, too.
+void require_no_packed_bytes(const Fields& fields, const MrcHeader& header,
+                             const std::string& name) {
+  if (header.mode != MrcMode::kInt8 || fields.int32(kImodStamp) != kImodStampValue ||
+      (fields.int32(kImodFlags) & kImodPacked) == 0)
+    return;
+  throw Error(
+      fmt::format("'{}': its bytes have two values of 4 bits (IMOD's flag {}), which "
+                  "cannot be read; expand them first (IMOD's newstack -mode 1)",
+                  name, kImodPacked));
+}
+
 // Returns cell length over number of samples, never rounded; 0 without samples.
 double stated_size_A(const Fields& fields, std::size_t axis) {
   const double cell_A = fields.float32(kCell + 4 * axis);
@@ -198,6 +212,7 @@ MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name
   header.nz = fields.int32(kSize + 8);
   require_sizes(header, name);
   require_axis_order(fields, name);
+  require_no_packed_bytes(fields, header, name);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     header.voxel_size_A[axis] = decode_voxel_size(fields, axis);
     header.origin_A[axis] = fields.float32(kOrigin + 4 * axis);
@@ -384,6 +399,14 @@ std::optional<MrcFacts> find_mrc_facts(const std::filesystem::path& path, const 
   const auto width = static_cast<std::int64_t>(bytes_per_value(header.mode));
   return MrcFacts{{stated_size_A(fields, 0), stated_size_A(fields, 1), stated_size_A(fields, 2)},
                   beyond / (header.nx * header.ny * width)};
+}
+
+bool is_in_labels(const MrcHeader& header, std::string_view word) {
+  return std::ranges::any_of(header.labels, [&](std::string label) {
+    std::ranges::transform(label, label.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return label.find(word) != std::string::npos;
+  });
 }
 
 }  // namespace tomofield::io

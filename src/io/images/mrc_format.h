@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/images/mrc.h"
@@ -88,5 +89,9 @@ struct MrcFacts {
 /// Returns the facts of a file that was read with this header. Returns nothing if it is no MRC file
 /// of this header, but a TIFF file, a table that names images, or the name of a stack in memory.
 std::optional<MrcFacts> find_mrc_facts(const std::filesystem::path& path, const MrcHeader& header);
+
+/// Tells whether a label of a file has a word, such as the name of a program that has made it.
+/// `word` is in lower case; labels may be in any.
+bool is_in_labels(const MrcHeader& header, std::string_view word);
 
 }  // namespace tomofield::io

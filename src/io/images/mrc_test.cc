@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/threads/parallel.h"
+#include "expect_parts.h"
 #include "python_script.h"
 #include "tomofield/error.h"
 #include "warning_catcher.h"
@@ -116,6 +117,17 @@ TEST(Mrc, TurnsTheOriginOfImodAround) {
   EXPECT_EQ(imods, (std::array<double, 3>{-50, -40, 0}));
   bytes[152] = 0;
   EXPECT_EQ(MrcReader(scratch.write("none.mrc", bytes)).header().origin_A, spec.origin_A);
+}
+
+// IMOD packs two values of 4 bits into a byte of mode 0, and says so by a flag (mrc_format.txt).
+TEST(Mrc, PackedBytesOfImodAreRefused) {
+  const ScratchDirectory scratch;
+  MrcWriter(scratch / "a.mrc", spec_of(4, 4, 2, MrcMode::kInt8)).close();
+  std::string bytes = testing::read_whole_file(scratch / "a.mrc");
+  bytes[156] = static_cast<char>(bytes[156] | 16);
+  const auto path = scratch.write("packed.mrc", bytes);
+  testing::expect_parts(testing::message_of<Error>([&] { MrcReader reader(path); }),
+                        {"packed.mrc", "4 bits", "newstack"});
 }
 
 TEST(Mrc, HalfFloatsThatDoNotHoldTheValuesAreNamed) {

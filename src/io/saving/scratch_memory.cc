@@ -24,7 +24,7 @@
 namespace tomofield::io {
 namespace {
 
-std::mutex g_mutex;  // guards writing the two below
+std::mutex g_fault_mutex;  // guards writing the two below
 std::array<char, 8192> g_fault_text;
 std::atomic<std::size_t> g_fault_length{0};
 
@@ -34,7 +34,7 @@ void prepare_fault(const char* noun, const std::filesystem::path& directory) {
       "\ntomofield: the scratch file with {} in '{}' cannot be read any more: the disk there has "
       "failed; write to another folder\n",
       noun, base::printable(directory.string()));
-  const std::lock_guard guard(g_mutex);
+  const std::lock_guard guard(g_fault_mutex);
   g_fault_length = 0;
   g_fault_length = line.copy(g_fault_text.data(), g_fault_text.size());
 }

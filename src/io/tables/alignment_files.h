@@ -57,7 +57,6 @@ struct MdocSection {
   std::int64_t section = 0;  ///< n, zero-based
   int line = 0;              ///< line of the tilt angle, or of the section's head without one
   std::optional<double> tilt_deg;
-  std::optional<double> pixel_spacing_A;
   std::optional<double> prior_dose;  ///< PriorRecordDose: electrons / Å² before this section
   std::optional<double> dose;        ///< ExposureDose: electrons / Å² of this section; 0: unknown
   std::optional<std::int64_t> time_s;       ///< DateTime, in seconds from some day on
@@ -65,6 +64,7 @@ struct MdocSection {
   std::optional<double> rotation_deg;       ///< RotationAngle
   std::optional<double> target_defocus_um;  ///< TargetDefocus: negative under focus
   std::string frame_name;                   ///< SubFramePath without its folders
+  std::string place_of_piece;  ///< x and y of PieceCoordinates, of a montage; empty: not stated
 };
 
 /// The tilt axis of the images, counter-clockwise from +Y, and the line that says so.
@@ -72,7 +72,7 @@ using AxisAngle = NumberLine;
 
 /// The contents of SerialEM's or Tomography's .mdoc, with sections in ascending order of n.
 struct Mdoc {
-  std::optional<double> pixel_spacing_A;  ///< value of the series, or of its first section
+  std::optional<double> pixel_spacing_A;  ///< of all sections
   /// SerialEM's "[T = Tilt axis angle = X]", else what TiltAxisAngle and RotationAngle say together
   /// (mdoc_axis.cc). RotationAngle alone is another angle.
   std::optional<AxisAngle> tilt_axis_deg;
@@ -96,8 +96,9 @@ std::optional<std::string_view> tomography_axis_of_title(std::string_view title)
 /// the angle itself otherwise.
 void set_axis_of_tomography(const AxisAngle& stated, bool is_title, Mdoc& mdoc);
 
-/// Reads an .mdoc file. Skips unknown keys, because SerialEM adds new ones every year. Throws Error
-/// for a section that comes twice.
+/// Reads an .mdoc file. Skips unknown keys, because SerialEM adds new ones every year, and sections
+/// of other kinds. Throws Error for a section or an entry of it that comes twice, for pixel sizes
+/// or voltages that differ, and for a montage.
 Mdoc read_mdoc(const std::filesystem::path& path);
 
 /// Returns the underfocus in µm at which the sections were to be recorded: the median of their

@@ -28,7 +28,8 @@ TEST(NumberColumn, ReadsAnglesWithTheirLines) {
 
 TEST(NumberColumn, NamesFileLineAndText) {
   const ScratchDirectory scratch;
-  for (const std::string bad : {"abc", "1.5x", "nan", "inf", "1,5", "--3", "1e999", "361", "1 2"}) {
+  for (const std::string bad :
+       {"abc", "1.5x", "nan", "inf", "1,5", "--3", "+-3", "1e999", "361", "1 2"}) {
     const auto path = scratch.write("a.tlt", "1\n" + bad + "\n");
     expect_parts(message_of<Error>([&] { read_number_column(path, "an angle"); }),
                  {"a.tlt", "line 2", bad, "an angle"});
@@ -99,100 +100,6 @@ TEST(ImodTransforms, RefusesMalformedLines) {
   }
 }
 
-TEST(Mdoc, ReadsSectionsInAnyOrder) {
-  const ScratchDirectory scratch;
-  const auto path = scratch.write("a.mdoc", R"(PixelSpacing = 2.17
-ImageFile = a.st
-
-[T = SerialEM: Tilt axis angle = 85.9, binning = 1]
-
-[ZValue = 1]
-ExposureDose = 3
-TiltAngle = 3.001
-SomeNewKey = what=ever
-
-[ZValue = 0]
-TiltAngle = -0.002
-RotationAngle = 175.9
-)");
-  const Mdoc mdoc = read_mdoc(path);
-  EXPECT_EQ(mdoc.pixel_spacing_A, 2.17);
-  ASSERT_EQ(mdoc.sections.size(), 2u);
-  EXPECT_EQ(mdoc.sections[0].section, 0);
-  EXPECT_EQ(mdoc.sections[0].tilt_deg, -0.002);
-  EXPECT_EQ(mdoc.sections[1].tilt_deg, 3.001);
-  EXPECT_EQ(mdoc.sections[1].line, 8);
-}
-
-TEST(Mdoc, RefusesWhatContradictsItself) {
-  const ScratchDirectory scratch;
-  expect_parts(message_of<Error>(
-                   [&] { read_mdoc(scratch.write("a.mdoc", "[ZValue = 0]\nTiltAngle = up\n")); }),
-               {"a.mdoc", "line 2", "TiltAngle = up"});
-  expect_parts(message_of<Error>(
-                   [&] { read_mdoc(scratch.write("a.mdoc", "[ZValue = 0]\n[ZValue = 0]\n")); }),
-               {"a.mdoc", "line 2", "twice"});
-  for (const char* bad : {"[ZValue = first]\n", "[ZValue = 0]\nTiltAngle = nan\n",
-                          "[ZValue = 0]\nTiltAngle = 1e300\n", "PixelSpacing = inf\n[ZValue = 0]\n",
-                          "[ZValue = 9999999999999]\n"})
-    EXPECT_THROW(read_mdoc(scratch.write("a.mdoc", bad)), Error) << bad;
-}
-
-TEST(Mdoc, AxisComesFromTheTitleAndNeverFromRotationAngle) {
-  const ScratchDirectory scratch;
-  const auto axis = [&](const std::string& text) {
-    return read_mdoc(scratch.write("a.mdoc", text + "\n[ZValue = 0]\nRotationAngle = 175\n"))
-        .tilt_axis_deg;
-  };
-  const std::string title = "[T =     Tilt axis angle = -94.8, binning = 1  spot = 8  camera = 0]";
-  EXPECT_EQ(axis(title)->value, -94.8);
-  EXPECT_EQ(axis("TiltAxisAngle = 176.5\n" + title)->value, -94.8);
-  EXPECT_EQ(axis("TiltAxisAngle = 176.5\n" + title)->line, 2);
-  EXPECT_EQ(axis(title + "\nTiltAxisAngle = 176.5")->value, -94.8);
-  EXPECT_EQ(axis("TiltAxisAngle = 176.5")->value, 176.5);
-  EXPECT_EQ(axis("[T = SerialEM: Digitized on EMBL Krios]"), std::nullopt);
-  expect_parts(message_of<Error>([&] { axis("[T = Tilt axis angle = steep, binning = 1]"); }),
-               {"a.mdoc", "line 1", "steep"});
-}
-
-std::vector<std::size_t> order_of(const std::vector<std::string>& entries) {
-  const ScratchDirectory scratch;
-  std::string text;
-  for (std::size_t i = 0; i < entries.size(); ++i)
-    text += "[ZValue = " + std::to_string(i) + "]\n" + entries[i] + "\n";
-  return acquisition_order(read_mdoc(scratch.write("a.mdoc", text))).sections;
-}
-
-TEST(Mdoc, OrderIsByTimeElseByDoseElseByNumber) {
-  using Order = std::vector<std::size_t>;
-  EXPECT_EQ(order_of({"DateTime = 01-Mar-21  00:00:03\nPriorRecordDose = 0",
-                      "DateTime = 28-Feb-21  23:59:59\nPriorRecordDose = 6",
-                      "DateTime = 01-Mar-21  00:00:01\nPriorRecordDose = 3"}),
-            (Order{1, 2, 0}));
-  EXPECT_EQ(order_of({"DateTime = 2024-03-01 00:00:03", "DateTime = 2024-02-29 23:59:59"}),
-            (Order{1, 0}));
-  // One of the times is none, or two are the same.
-  EXPECT_EQ(order_of({"DateTime = 31-Feb-21 00:00:01\nPriorRecordDose = 3",
-                      "DateTime = 01-Feb-21 00:00:01\nPriorRecordDose = 0"}),
-            (Order{1, 0}));
-  EXPECT_EQ(order_of({"DateTime = 01-Feb-21 00:00:01\nPriorRecordDose = 3",
-                      "DateTime = 01-Feb-21 00:00:01\nPriorRecordDose = 0"}),
-            (Order{1, 0}));
-  EXPECT_EQ(order_of({"PriorRecordDose = 0", "PriorRecordDose = 0"}), (Order{0, 1}));
-  EXPECT_EQ(order_of({"PriorRecordDose = 5", ""}), (Order{0, 1}));
-}
-
-TEST(Mdoc, FilesAreNamedWithoutTheirFolders) {
-  const ScratchDirectory scratch;
-  const Mdoc mdoc = read_mdoc(scratch.write(
-      "a.mdoc",
-      "ImageFile = D:\\data\\a.st\n[ZValue = 0]\nSubFramePath = X:\\fr ames\\a_1.eer\n"
-      "[ZValue = 1]\nSubFramePath = /mnt/a_2.tif\n"));
-  EXPECT_EQ(mdoc.image_file, "a.st");
-  EXPECT_EQ(mdoc.sections[0].frame_name, "a_1.eer");
-  EXPECT_EQ(mdoc.sections[1].frame_name, "a_2.tif");
-}
-
 std::string aln_row(int section) {
   return std::to_string(section) + " 85.5 1.0 3.5 -2.25 nan 1.0 1.0 0.0 " +
          std::to_string(10 * section - 20) + "\n";
@@ -227,6 +134,21 @@ TEST(AreTomoAlignment, ReadsHeaderGlobalAndLocalRows) {
   EXPECT_EQ(alignment.patches[0][0].y_px, 2.0);
   EXPECT_EQ(alignment.patches[0][0].shift_x_px, 0.1);
   EXPECT_TRUE(alignment.patches[1].empty());  // AreTomo calls it bad
+}
+
+TEST(AreTomoAlignment, RefusesAHeaderThatContradictsTheFile) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::string& head, const std::string& tail = "") {
+    return message_of<Error>(
+        [&] { read_aretomo_alignment(scratch.write("a.aln", head + "\n" + aln_row(0) + tail)); });
+  };
+  EXPECT_EQ(refusal("# Thickness = 24\n# Thickness = 24"), "");
+  expect_parts(refusal("# Thickness = 24\n# Thickness = 90"), {"a.aln", "line 2", "Thickness"});
+  expect_parts(refusal("# RawSize = 48.9 48 1"), {"line 1", "RawSize", "whole"});
+  expect_parts(refusal("# DarkFrame = 3.7 3"), {"line 1", "DarkFrame", "whole"});
+  expect_parts(refusal("# NumPatches = 4"), {"a.aln", "NumPatches = 4", "no rows"});
+  expect_parts(refusal("# NumPatches = 1", "# Local Alignment\n0 0 1 2 0.1 0.2 abc\n"),
+               {"a.aln", "line 4", "flag"});
 }
 
 TEST(AreTomoAlignment, RefusesMalformedRows) {
@@ -367,63 +289,6 @@ TEST(SectionList, IsWrittenAsItIsRead) {
     for (auto& section : sections) ++section;
     EXPECT_EQ(section_list(sections), text);
   }
-}
-
-TEST(Mdoc, ReadsTheAxisOfTomographyByRotationAngle) {
-  const ScratchDirectory scratch;
-  const auto read = [&](const char* axis, const std::string& rotation) {
-    return read_mdoc(scratch.write("a.mdoc", fmt::format("[T =   TiltAxisAngle = {}  Binning = 1  "
-                                                         "SpotSize = 6]\n[ZValue = 0]\n{}\n",
-                                                         axis, rotation)));
-  };
-  // The three relations of IMOD's header.f90.
-  EXPECT_EQ(read("-176.20", "RotationAngle = 86.20").tilt_axis_deg->value, 86.2);
-  EXPECT_EQ(read("86.2", "RotationAngle = 176.2").tilt_axis_deg->value, 86.2);
-  EXPECT_EQ(read("-86.2", "RotationAngle = 176.2").tilt_axis_deg->value, 86.2);
-  for (const char* rotation : {"", "RotationAngle = 20"}) {
-    const Mdoc unclear = read("-176.20", rotation);
-    EXPECT_FALSE(unclear.tilt_axis_deg);
-    EXPECT_EQ(unclear.unclear_axis_deg->value, -176.2);
-    EXPECT_EQ(unclear.unclear_axis_deg->line, 1);
-  }
-}
-
-TEST(Mdoc, ReadsTheMicroscope) {
-  const ScratchDirectory scratch;
-  const Mdoc mdoc = read_mdoc(
-      scratch.write("a.mdoc",
-                    "\xEF\xBB\xBFPixelSpacing = 5.4\r\nVoltage = 200\r\nImageSize = 1440 1023\r\n"
-                    "[ZValue = 0]\r\nTiltAngle = 3\r\n"));
-  EXPECT_EQ(mdoc.pixel_spacing_A, 5.4);
-  EXPECT_EQ(mdoc.voltage_kV, 200.0);
-  EXPECT_EQ(*mdoc.image_size_px, (std::array<std::int64_t, 2>{1440, 1023}));
-  EXPECT_EQ(mdoc.sections[0].tilt_deg, 3.0);
-  EXPECT_FALSE(read_mdoc(scratch.write("a.mdoc", "Voltage = 0\n[ZValue = 0]\n")).voltage_kV);
-}
-
-TEST(Mdoc, RefusesAPixelSizeThatCannotBe) {
-  const ScratchDirectory scratch;
-  const auto read = [&](const std::string& size) {
-    return read_mdoc(scratch.write("a.mdoc", "[ZValue = 0]\nPixelSpacing = " + size + "\n"));
-  };
-  EXPECT_EQ(read("0").pixel_spacing_A, 0.0);  // not known
-  for (const char* bad : {"-10", "1e-30", "1e8"})
-    expect_parts(message_of<Error>([&] { read(bad); }), {"a.mdoc", "line 2", "PixelSpacing"});
-}
-
-TEST(Mdoc, ReadsTheDefocusThatTheSessionAimedAt) {
-  const ScratchDirectory scratch;
-  const auto target_um = [&](const char* text) {
-    return target_underfocus_um(read_mdoc(scratch.write("a.mdoc", text)));
-  };
-  EXPECT_EQ(target_um("[ZValue = 0]\nTargetDefocus = -3\n[ZValue = 1]\n"
-                      "[ZValue = 2]\nTargetDefocus = -3\n[ZValue = 3]\nTargetDefocus = -5\n"),
-            3.0);
-  for (const char* none :
-       {"[ZValue = 0]\nDefocus = -3\n", "[ZValue = 0]\nTargetDefocus = 0\n",
-        "[ZValue = 0]\nTargetDefocus = 2\n", "[ZValue = 0]\nTargetDefocus = nan\n",
-        "[ZValue = 0]\nTargetDefocus = -1e9\n"})
-    EXPECT_FALSE(target_um(none)) << none;
 }
 
 TEST(AreTomoSections, NeverAssumes) {

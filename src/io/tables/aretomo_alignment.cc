@@ -1,7 +1,12 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <functional>
+#include <map>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "io/tables/alignment_files.h"
 #include "io/tables/text_lines.h"
@@ -27,9 +32,12 @@ std::vector<double> parse_numbers(std::string_view text) {
   return numbers;
 }
 
+// What the header states of the whole file, by its name.
+using StatedNumbers = std::map<std::string, std::vector<double>, std::less<>>;
+
 // Parses "# name = numbers" and skips comments of any other form.
 void parse_header_line(const std::filesystem::path& path, const TextLine& line,
-                       AreTomoAlignment* alignment) {
+                       StatedNumbers& stated, AreTomoAlignment* alignment) {
   const std::size_t equals = line.text.find('=');
   if (equals == std::string::npos) return;
   const std::string_view text = line.text;
@@ -40,7 +48,19 @@ void parse_header_line(const std::filesystem::path& path, const TextLine& line,
       throw_row_error(path, line, fmt::format("{} with {} numbers", name, count));
     }
   };
-  const auto integer = [&](std::size_t i) { return static_cast<std::int64_t>(numbers[i]); };
+  const auto integer = [&](std::size_t i) {
+    const auto whole = static_cast<std::int64_t>(numbers[i]);
+    if (static_cast<double>(whole) != numbers[i])
+      throw_row_error(path, line, fmt::format("{} with whole numbers", name));
+    return whole;
+  };
+  constexpr std::array<std::string_view, 5> kOfFile{"RawSize", "NumPatches", "AlphaOffset",
+                                                    "BetaOffset", "Thickness"};
+  if (std::ranges::find(kOfFile, name) != kOfFile.end()) {
+    const auto [other, is_new] = stated.emplace(name, numbers);
+    if (!is_new && other->second != numbers)
+      throw_row_error(path, line, fmt::format("the {} that a line before states", name));
+  }
   if (name == "RawSize") {
     require(3);
     alignment->raw_size = {integer(0), integer(1), integer(2)};
@@ -113,13 +133,18 @@ struct PatchRows {
 // file states.
 void require_all_patches(const std::filesystem::path& path, const AreTomoAlignment& alignment,
                          const PatchRows& rows) {
-  if (rows.counts.empty() || alignment.num_patches <= 0) return;
+  if (alignment.num_patches <= 0) return;
+  if (rows.counts.empty())
+    throw Error(fmt::format(
+        "'{}' has no rows of the local alignment, and '# NumPatches = {}' states as many for each "
+        "view: take a whole copy of the file, or write '# NumPatches = 0' to do without it",
+        path.string(), alignment.num_patches));
   for (std::size_t t = 0; t < rows.counts.size(); ++t) {
     if (rows.counts[t] == alignment.num_patches) continue;
     throw Error(fmt::format(
         "'{}', which ends at line {}, has {} row{} of the local alignment of view {}, and "
-        "'# NumPatches = {}' states as many for each: take a whole copy of the file, or delete the "
-        "lines from '# Local Alignment' on to do without it",
+        "'# NumPatches = {}' states as many for each: take a whole copy of the file, or write "
+        "'# NumPatches = 0' and delete the lines from '# Local Alignment' on to do without it",
         path.string(), rows.last_line, rows.counts[t], rows.counts[t] == 1 ? "" : "s", t,
         alignment.num_patches));
   }
@@ -142,7 +167,8 @@ void add_patch(const std::filesystem::path& path, const TextLine& line, AreTomoA
   ++rows.counts[static_cast<std::size_t>(*row)];
   rows.last_line = line.number;
   const auto good = parse_number(words[6]);
-  if (!good || *good < 0.9) return;  // as AreTomo does; such a row may have nan
+  if (!good) throw_row_error(path, line, "a row of the local alignment, whose flag is a number");
+  if (*good < 0.9) return;  // as AreTomo does; such a row may have nan
   std::array<double, 4> numbers{};
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     const auto number = parse_number(words[2 + i], base::kLargestPosition_px);
@@ -158,11 +184,12 @@ void add_patch(const std::filesystem::path& path, const TextLine& line, AreTomoA
 AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path, bool needs_tilt) {
   AreTomoAlignment alignment;
   PatchRows patch_rows;
+  StatedNumbers stated;
   bool is_local_part = false;
   for (const TextLine& line : read_text_lines(path)) {
     if (line.text.starts_with('#')) {
       is_local_part = is_local_part || line.text.find("Local Alignment") != std::string::npos;
-      parse_header_line(path, line, &alignment);
+      parse_header_line(path, line, stated, &alignment);
     } else if (is_local_part) {
       add_patch(path, line, alignment, patch_rows);
     } else {

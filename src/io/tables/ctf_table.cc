@@ -27,6 +27,7 @@ CtfTable read_any(const std::filesystem::path& path) {
 
 CtfTable read_ctf(const std::filesystem::path& path) {
   CtfTable table = read_any(path);
+  require_possible(table.optics, path);
   const bool has_any = std::ranges::any_of(
       table.views, [](const std::optional<Defocus>& defocus) { return defocus.has_value(); });
   if (!has_any) {
@@ -39,7 +40,7 @@ CtfTable read_ctf(const std::filesystem::path& path) {
 // Warp estimates the contrast transfer of a tilt series into the grids of its XML file.
 CtfTable read_warp_ctf(const std::filesystem::path& path) {
   const ViewTable series = read_warp_xml(path);
-  CtfTable table{path, {}, series.optics, {}};
+  CtfTable table{path, {}, series.optics, series.ctf_not_applied};
   for (const ListedView& view : series.views) table.views.push_back(view.defocus);
   return table;
 }

@@ -220,5 +220,35 @@ TEST(CtfTable, IsReadAsItWasWritten) {
   EXPECT_EQ(read_ctf(scratch / "a.txt").optics.voltage_kV, 300.0);
 }
 
+TEST(CtfTable, UnitsAndLimitsOfTheMicroscopeAreRefused) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::string& comment) {
+    const auto path = scratch.write("a_ctf.txt", "# " + comment +
+                                                     "\n# Columns: #2 - defocus 1 [Angstroms]\n"
+                                                     "1 30000 30000 0 0 0.5 5\n");
+    return message_of<Error>([&] { read_ctf(path); });
+  };
+  EXPECT_EQ(refusal("acceleration voltage: 300.0 keV ; spherical aberration: 2.70 mm ; "
+                    "amplitude contrast: 0.07"),
+            "");
+  expect_parts(refusal("acceleration voltage: 300000 V"), {"line 1", "'V'", "keV"});
+  expect_parts(refusal("spherical aberration: 2700 um"), {"line 1", "'um'", "mm"});
+  expect_parts(refusal("acceleration voltage: 300000 keV"), {"voltage", "300000"});
+  expect_parts(refusal("spherical aberration: -2.7 mm"), {"aberration", "-2.7"});
+  expect_parts(refusal("amplitude contrast: 7"), {"amplitude contrast", "7"});
+}
+
+TEST(CtfTable, ADefocusOfImodThatComesTwiceIsRefused) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::string& lines) {
+    return message_of<Error>([&] { read_ctf(scratch.write("a.defocus", lines)); });
+  };
+  EXPECT_EQ(refusal("1 3 0 0 3000 2\n2 4 0 0 3100\n"), "");
+  expect_parts(refusal("1 1 0 0 3000 2\n2 2 0 0 3100\n2 2 0 0 3200\n"),
+               {"line 3", "view 2", "twice"});
+  expect_parts(refusal("1 3 0 0 3000 2\n2 2 0 0 3100\n"), {"line 2", "view 2", "twice"});
+  expect_parts(refusal("1.5 1.7 0 0 3000 2\n"), {"line 1", "1.5"});
+}
+
 }  // namespace
 }  // namespace tomofield::io

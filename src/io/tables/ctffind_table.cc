@@ -23,26 +23,30 @@ constexpr double kRadians = std::numbers::pi / 180.0;
 constexpr std::int64_t kMostSections = 100000;
 
 // Returns the number that follows a key of a comment, as in "acceleration voltage: 300.0 keV".
-// Returns nothing without the key. Throws Error if no number follows it.
+// Returns nothing without the key. Throws Error if no number follows it, or another unit.
 std::optional<double> number_after(const std::filesystem::path& path, const TextLine& line,
-                                   std::string_view key) {
+                                   std::string_view key, std::string_view unit) {
   const std::string_view text = line.text;
   const std::size_t at = text.find(key);
   if (at == std::string_view::npos) return std::nullopt;
   const auto words = split_words(text.substr(at + key.size()));
   const auto number = words.empty() ? std::nullopt : parse_number(words.front());
-  if (number) return *number;
-  throw Error(
-      fmt::format("'{}', line {}: no number follows '{}'", path.string(), line.number, key));
+  if (!number)
+    throw Error(fmt::format("'{}', line {}: no number that can be follows '{}'", path.string(),
+                            line.number, key));
+  const bool has_unit = !unit.empty() && words.size() > 1 && words[1] != ";";
+  if (!has_unit || words[1] == unit || (unit == "keV" && words[1] == "kV")) return *number;
+  throw Error(fmt::format("'{}', line {}: '{}' is in '{}', and CTFFIND writes {}: correct it",
+                          path.string(), line.number, key, words[1], unit));
 }
 
 void read_comment(const std::filesystem::path& path, const TextLine& line, StatedOptics& optics) {
-  const auto take = [&](std::string_view key, std::optional<double>& value) {
-    if (const auto number = number_after(path, line, key)) value = number;
+  const auto take = [&](std::string_view key, std::string_view unit, std::optional<double>& value) {
+    if (const auto number = number_after(path, line, key, unit)) value = number;
   };
-  take("acceleration voltage:", optics.voltage_kV);
-  take("spherical aberration:", optics.spherical_aberration_mm);
-  take("amplitude contrast:", optics.amplitude_contrast);
+  take("acceleration voltage:", "keV", optics.voltage_kV);
+  take("spherical aberration:", "mm", optics.spherical_aberration_mm);
+  take("amplitude contrast:", "", optics.amplitude_contrast);
 }
 
 struct Row {
@@ -59,6 +63,9 @@ Row parse_row(const std::filesystem::path& path, const TextLine& line) {
   bool is_valid = words.size() >= kLargest.size() + 2;
   for (std::size_t i = 0; is_valid && i < values.size(); ++i) {
     const auto value = parse_number(words[i], kLargest[i]);
+    if (!value && parse_number(words[i]))
+      throw Error(fmt::format("'{}', line {}: column {} is {}, and a number up to {:g} is expected",
+                              path.string(), line.number, i + 1, words[i], kLargest[i]));
     is_valid = value.has_value();
     values[i] = value ? double{*value} : 0.0;
   }

@@ -92,6 +92,8 @@ Entry parse_entry(const std::filesystem::path& path, const TextLine& line, const
   }
   const auto first = static_cast<std::int64_t>(values[0]),
              last = static_cast<std::int64_t>(values[1]);
+  is_valid =
+      is_valid && values[0] == static_cast<double>(first) && values[1] == static_cast<double>(last);
   if (!is_valid || first < 1 || last < first || last > kMostViews) {
     throw Error(fmt::format(
         "'{}', line {}: '{}' is not a line of a .defocus file: first and last view, their angles, "
@@ -159,7 +161,10 @@ CtfTable read_imod_defocus(const std::filesystem::path& path) {
   std::vector<std::optional<double>> tilts;  // of views with a line of their own
   for (const TextLine& line : lines) {
     const Entry entry = parse_entry(path, line, form, num_words);
-    at_middle[(entry.first_view + entry.last_view) / 2] = entry.defocus;
+    const std::int64_t middle = (entry.first_view + entry.last_view) / 2;
+    if (!at_middle.emplace(middle, entry.defocus).second)
+      throw Error(fmt::format("'{}', line {}: the defocus of view {} comes twice: leave one out",
+                              path.string(), line.number, middle + 1));
     num_views = std::max(num_views, entry.last_view + 1);
     tilts.resize(static_cast<std::size_t>(num_views));
     if (entry.first_view == entry.last_view)

@@ -159,8 +159,14 @@ void read_part(const std::filesystem::path& path, const Head& head, Numbers& num
   for (ImodLocalPart& part : of_section) {
     const auto t = numbers.next(6);
     part.transform = {t[0], t[1], t[2], t[3], t[4], t[5]};
-    constexpr double kSmallest = 0.5;  // no part is half as large as another
-    if (t[0] * t[3] - t[1] * t[2] < kSmallest || std::abs(part.tilt_deg) > base::kLargestAngle_deg)
+    constexpr double kSmallest = 0.5;            // no part is half as large as another
+    constexpr double kLargestChange_deg = 30.0;  // of the tilt, by a local alignment
+    if (std::abs(part.tilt_deg) > kLargestChange_deg)
+      throw Error(
+          fmt::format("'{}' changes the tilt of a part by {}°, and a local alignment changes "
+                      "it by at most {}°: the file is damaged, or is not of this series",
+                      path.string(), part.tilt_deg, kLargestChange_deg));
+    if (t[0] * t[3] - t[1] * t[2] < kSmallest)
       throw Error(
           fmt::format("'{}' has a local alignment by {} {} {} {} {} {}, which no part of a "
                       "view can have: the file is damaged, or is not of this series",

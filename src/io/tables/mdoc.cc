@@ -3,15 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
+#include <functional>
 #include <map>
-#include <numeric>
 #include <string>
 #include <utility>
 
-#include "base/statistics.h"
 #include "io/named_file.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/text_lines.h"
+#include "io/tables/view_table.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -26,6 +27,13 @@ KeyValue split_key_value(std::string_view text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string_view::npos) return {};
   return {trim(text.substr(0, equals)), trim(text.substr(equals + 1))};
+}
+
+[[noreturn]] void throw_montage(const std::string& where) {
+  throw Error(
+      fmt::format("{}: a montage of pieces is not read: blend them into one image a view "
+                  "(IMOD's blendmont), and give that stack",
+                  where));
 }
 
 double require_number(const std::filesystem::path& path, const TextLine& line,
@@ -44,12 +52,21 @@ struct StatedAxes {
 // Notes the angle of "[T = Tilt axis angle = 85.9, binning = 1 …]" and of Tomography's
 // "[T = TiltAxisAngle = -175.9 …]". Other titles have none.
 void read_title(const std::filesystem::path& path, const TextLine& line, StatedAxes& axes) {
-  if (!line.text.starts_with("[T")) return;
   const auto angle = [&](std::string_view word) {
     return AxisAngle{require_number(path, line, word, base::kLargestAngle_deg), line.number};
   };
-  if (const auto word = axis_of_title(line.text)) axes.serialem = angle(*word);
-  if (const auto word = tomography_axis_of_title(line.text)) axes.tomography = angle(*word);
+  const auto set = [&](std::optional<std::string_view> word, std::optional<AxisAngle>& axis) {
+    if (!word) return;
+    const AxisAngle found = angle(*word);
+    if (axis && axis->value != found.value)
+      throw Error(
+          fmt::format("'{}', line {}: the tilt axis is {}°, and {}° in line {}: a series "
+                      "has one, so leave one out",
+                      path.string(), line.number, found.value, axis->value, axis->line));
+    axis = found;
+  };
+  set(axis_of_title(line.text), axes.serialem);
+  set(tomography_axis_of_title(line.text), axes.tomography);
 }
 
 // Sets the axis of the first of the angles there are.
@@ -69,10 +86,9 @@ constexpr double kLargestDefocus_um = 1000;
 // Error for one that no microscope has.
 std::optional<double> parse_voltage_kV(const std::filesystem::path& path, const TextLine& line,
                                        std::string_view word) {
-  constexpr double kLowest_kV = 20, kHighest_kV = 3000;
   const double voltage_kV = require_number(path, line, word, base::kLargestNumber);
   if (voltage_kV == 0.0 || voltage_kV == -1.0) return std::nullopt;
-  if (voltage_kV >= kLowest_kV && voltage_kV <= kHighest_kV) return voltage_kV;
+  if (kVoltages_kV.find(voltage_kV)) return voltage_kV;
   throw Error(fmt::format("'{}', line {}: no microscope has a voltage of {} kV", path.string(),
                           line.number, voltage_kV));
 }
@@ -177,6 +193,37 @@ double require_dose(const std::filesystem::path& path, const TextLine& line,
                           line.number, entry.key, dose));
 }
 
+// Returns a target that a microscope can have; nothing for what is no number, as of a session
+// without one.
+std::optional<double> parse_target_um(const std::filesystem::path& path, const TextLine& line,
+                                      std::string_view word) {
+  const auto target_um = parse_number(word, kLargestDefocus_um);
+  if (!target_um && parse_number(word))
+    throw Error(fmt::format("'{}', line {}: TargetDefocus is {} µm, and from -{} to {} is possible",
+                            path.string(), line.number, word, kLargestDefocus_um,
+                            kLargestDefocus_um));
+  return target_um;
+}
+
+// The entries of a section that have been read: a second one must say the same.
+class EntriesOfSection {
+ public:
+  void require_new(const std::filesystem::path& path, const TextLine& line, const KeyValue& entry) {
+    constexpr std::array<std::string_view, 8> kRead{
+        "TiltAngle",     "PriorRecordDose", "ExposureDose", "DateTime",
+        "RotationAngle", "TargetDefocus",   "SubFramePath", "PixelSpacing"};
+    if (std::ranges::find(kRead, entry.key) == kRead.end()) return;
+    const auto [other, is_new] = values_.emplace(entry.key, entry.value);
+    if (!is_new && other->second != entry.value)
+      throw Error(fmt::format("'{}', line {}: {} comes twice in its section, as '{}' and '{}'",
+                              path.string(), line.number, entry.key, quote(other->second),
+                              quote(entry.value)));
+  }
+
+ private:
+  std::map<std::string, std::string, std::less<>> values_;
+};
+
 // Sets what an entry of a section says.
 void read_section_entry(const std::filesystem::path& path, const TextLine& line,
                         const KeyValue& entry, MdocSection* section) {
@@ -193,47 +240,63 @@ void read_section_entry(const std::filesystem::path& path, const TextLine& line,
   } else if (entry.key == "RotationAngle") {
     section->rotation_deg = parse_number(entry.value, base::kLargestAngle_deg);
   } else if (entry.key == "TargetDefocus") {
-    section->target_defocus_um = parse_number(entry.value, kLargestDefocus_um);
+    section->target_defocus_um = parse_target_um(path, line, entry.value);
   } else if (entry.key == "SubFramePath") {
     section->frame_name = without_folders(entry.value);
+  } else if (entry.key == "PieceCoordinates") {
+    section->place_of_piece = entry.value.substr(0, entry.value.find_last_of(' '));
   }
 }
 
-// Returns the order of sections by a key, if all have it and no two are equal.
-template <typename Key>
-std::optional<std::vector<std::size_t>> order_by(const std::vector<MdocSection>& sections,
-                                                 std::optional<Key> MdocSection::*key) {
-  std::vector<std::size_t> order(sections.size());
-  std::iota(order.begin(), order.end(), 0);
-  if (!std::ranges::all_of(sections, [&](const MdocSection& s) { return (s.*key).has_value(); }))
-    return std::nullopt;
-  const auto value = [&](std::size_t i) { return *(sections[i].*key); };
-  std::ranges::sort(order, {}, value);
-  const bool is_unique = std::ranges::adjacent_find(order, {}, value) == order.end();
-  return is_unique ? std::optional(order) : std::nullopt;
+// Throws Error for a voltage or a pixel size that differs from an earlier one.
+void require_same(const std::filesystem::path& path, const TextLine& line, std::string_view key,
+                  double value, double before) {
+  constexpr double kRounding = 0.01;
+  if (std::fabs(value - before) <= kRounding * before) return;
+  throw Error(fmt::format("'{}', line {}: {} is {}, and {} before: a series has one, so correct it",
+                          path.string(), line.number, key, value, before));
 }
 
-// Returns why the times give no order: AcquisitionOrder::fault_of_times.
-std::string fault_of_times(const std::vector<MdocSection>& sections) {
-  std::map<std::int64_t, std::int64_t> section_at;  // by its time
-  std::optional<std::int64_t> untimed;
-  std::string fault;
-  for (const MdocSection& section : sections) {
-    if (section.unread_time_line > 0)
-      return fmt::format("line {}: DateTime is not a date and a time such as 12-Mar-21 15:31:02",
-                         section.unread_time_line);
-    if (!section.time_s) {
-      untimed = untimed.value_or(section.section);
-      continue;
-    }
-    const auto [other, is_new] = section_at.emplace(*section.time_s, section.section);
-    if (!is_new && fault.empty())
-      fault = fmt::format("[ZValue = {}] and [ZValue = {}] have the same DateTime", other->second,
-                          section.section);
+// Sets what an entry above all sections says.
+void read_head_entry(const std::filesystem::path& path, const TextLine& line, const KeyValue& entry,
+                     Mdoc& mdoc) {
+  if (entry.key == "ImageFile") {
+    mdoc.image_file = without_folders(entry.value);
+  } else if (entry.key == "ImageSize") {
+    mdoc.image_size_px = parse_size(entry.value);
+  } else if (entry.key == "Montage" && entry.value != "0") {
+    throw_montage(fmt::format("'{}', line {}: Montage", path.string(), line.number));
   }
-  if (section_at.empty()) return "";
-  if (untimed) return fmt::format("[ZValue = {}] has no DateTime", *untimed);
-  return fault;
+}
+
+// Sets what an entry says that may stand above the sections and in them. Returns false for others.
+bool read_common_entry(const std::filesystem::path& path, const TextLine& line,
+                       const KeyValue& entry, StatedAxes& axes, Mdoc& mdoc) {
+  if (entry.key == "PixelSpacing") {
+    const double spacing_A = require_spacing_A(path, line, entry.value);
+    if (mdoc.pixel_spacing_A.value_or(0.0) > 0.0 && spacing_A > 0.0)
+      require_same(path, line, entry.key, spacing_A, *mdoc.pixel_spacing_A);
+    if (mdoc.pixel_spacing_A.value_or(0.0) == 0.0) mdoc.pixel_spacing_A = spacing_A;
+  } else if (entry.key == "TiltAxisAngle") {
+    const double axis_deg = require_number(path, line, entry.value, base::kLargestAngle_deg);
+    if (!axes.entry) axes.entry = AxisAngle{axis_deg, line.number};
+  } else if (entry.key == "Voltage") {
+    const auto voltage_kV = parse_voltage_kV(path, line, entry.value);
+    if (voltage_kV && mdoc.voltage_kV)
+      require_same(path, line, entry.key, *voltage_kV, *mdoc.voltage_kV);
+    if (voltage_kV) mdoc.voltage_kV = voltage_kV;
+  } else {
+    return false;
+  }
+  return true;
+}
+
+// The pieces of a montage have places, and the images of a tilt series have not.
+void require_no_pieces(const std::filesystem::path& path, const Mdoc& mdoc) {
+  for (const MdocSection& section : mdoc.sections)
+    if (section.place_of_piece != mdoc.sections.front().place_of_piece)
+      throw_montage(
+          fmt::format("'{}': PieceCoordinates of [ZValue = {}]", path.string(), section.section));
 }
 
 }  // namespace
@@ -241,63 +304,42 @@ std::string fault_of_times(const std::vector<MdocSection>& sections) {
 Mdoc read_mdoc(const std::filesystem::path& path) {
   Mdoc mdoc;
   StatedAxes axes;
-  bool is_in_section = false;
+  // Lines below a head of another kind, such as [MontSection = 0], are not of the section before.
+  enum class Part { kHead, kSection, kOther } part = Part::kHead;
+  EntriesOfSection entries;
   for (const TextLine& line : read_text_lines(path)) {
+    if (line.text.starts_with("[T")) {
+      read_title(path, line, axes);  // stands anywhere, and does not end a section
+      continue;
+    }
     if (line.text.starts_with('[')) {
       const auto section = parse_section_head(path, line);
-      // Titles "[T = …]" stand anywhere. They do not end a section.
+      part = section ? Part::kSection : Part::kOther;
       if (section) {
         mdoc.sections.emplace_back();
         mdoc.sections.back().section = *section;
         mdoc.sections.back().line = line.number;
       }
-      read_title(path, line, axes);
-      is_in_section = is_in_section || section.has_value();
+      entries = {};
       continue;
     }
     const KeyValue entry = split_key_value(line.text);
-    if (entry.key == "PixelSpacing") {
-      const double spacing_A = require_spacing_A(path, line, entry.value);
-      if (!mdoc.pixel_spacing_A) mdoc.pixel_spacing_A = spacing_A;
-      if (is_in_section) mdoc.sections.back().pixel_spacing_A = spacing_A;
-    } else if (entry.key == "TiltAxisAngle") {
-      const double axis_deg = require_number(path, line, entry.value, base::kLargestAngle_deg);
-      if (!axes.entry) axes.entry = AxisAngle{axis_deg, line.number};
-    } else if (entry.key == "Voltage" && !mdoc.voltage_kV) {
-      mdoc.voltage_kV = parse_voltage_kV(path, line, entry.value);
-    } else if (is_in_section) {
+    if (part == Part::kOther) continue;
+    if (part == Part::kSection) entries.require_new(path, line, entry);
+    if (read_common_entry(path, line, entry, axes, mdoc)) continue;
+    if (part == Part::kSection)
       read_section_entry(path, line, entry, &mdoc.sections.back());
-    } else if (entry.key == "ImageFile") {
-      mdoc.image_file = without_folders(entry.value);
-    } else if (entry.key == "ImageSize") {
-      mdoc.image_size_px = parse_size(entry.value);
-    }
+    else
+      read_head_entry(path, line, entry, mdoc);
   }
   if (mdoc.sections.empty()) {
     throw Error(fmt::format("'{}' has no sections, [ZValue = 0] and so on: is it an .mdoc file?",
                             path.string()));
   }
   sort_and_require_unique(path, &mdoc);
+  require_no_pieces(path, mdoc);
   choose_axis(axes, mdoc);
   return mdoc;
-}
-
-std::optional<double> target_underfocus_um(const Mdoc& mdoc) {
-  std::vector<double> underfocus_um;
-  for (const MdocSection& section : mdoc.sections)
-    if (section.target_defocus_um) underfocus_um.push_back(-*section.target_defocus_um);
-  if (underfocus_um.empty()) return std::nullopt;
-  const double target_um = base::median(std::move(underfocus_um));
-  return target_um > 0.0 ? std::optional(target_um) : std::nullopt;
-}
-
-AcquisitionOrder acquisition_order(const Mdoc& mdoc) {
-  if (auto by_time = order_by(mdoc.sections, &MdocSection::time_s)) return {*by_time, true, ""};
-  if (auto by_dose = order_by(mdoc.sections, &MdocSection::prior_dose)) return {*by_dose, true, ""};
-  AcquisitionOrder as_numbered{.sections = std::vector<std::size_t>(mdoc.sections.size()),
-                               .fault_of_times = fault_of_times(mdoc.sections)};
-  std::iota(as_numbered.sections.begin(), as_numbered.sections.end(), 0);
-  return as_numbered;
 }
 
 }  // namespace tomofield::io

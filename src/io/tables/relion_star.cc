@@ -56,18 +56,38 @@ StatedOptics optics_by(const Find& find) {
   return {find("rlnVoltage"), find("rlnSphericalAberration"), find("rlnAmplitudeContrast")};
 }
 
-// Returns the number in the first row of whichever table has the column.
-std::optional<double> first_number(const std::filesystem::path& path,
-                                   const std::vector<StarTable>& tables, std::string_view column) {
+// Returns the number in all rows of whichever table has the column. Throws Error if they differ.
+std::optional<double> only_number(const std::filesystem::path& path,
+                                  const std::vector<StarTable>& tables, std::string_view column) {
   const StarTable* const table = find_table(tables, column);
   if (table == nullptr || table->num_rows() == 0) return std::nullopt;
-  return StarRow(path, *table, 0).find_number(column);
+  const auto in_row = [&](std::size_t i) { return StarRow(path, *table, i).find_number(column); };
+  const auto first = in_row(0);
+  for (std::size_t i = 1; i < table->num_rows(); ++i) {
+    const auto other = in_row(i);
+    if (other.has_value() == first.has_value() && (!other || *other == *first)) continue;
+    throw Error(
+        fmt::format("'{}': _{} of row {} is another than that of row 1, and a series has "
+                    "one: correct it",
+                    path.string(), column, i + 1));
+  }
+  return first;
+}
+
+// Returns the table with a column, or null. Throws Error if several have it.
+const StarTable* find_only_table(const std::filesystem::path& path,
+                                 const std::vector<StarTable>& tables, std::string_view column) {
+  const auto has_column = [&](const StarTable& table) { return table.has_column(column); };
+  if (std::ranges::count_if(tables, has_column) > 1)
+    throw Error(
+        fmt::format("'{}' has several tables with _{}: leave one of them", path.string(), column));
+  return find_table(tables, column);
 }
 
 // Returns the table that lists views.
 const StarTable& rows_of_views(const std::filesystem::path& path,
                                const std::vector<StarTable>& tables) {
-  const StarTable* const table = find_table(tables, "rlnMicrographName");
+  const StarTable* const table = find_only_table(path, tables, "rlnMicrographName");
   if (table != nullptr) return *table;
   if (find_table(tables, "rlnTomoProjX") != nullptr) {
     throw Error(fmt::format(
@@ -82,7 +102,7 @@ const StarTable& rows_of_views(const std::filesystem::path& path,
 }
 
 StatedOptics optics_of(const std::filesystem::path& path, const std::vector<StarTable>& tables) {
-  return optics_by([&](const char* column) { return first_number(path, tables, column); });
+  return optics_by([&](const char* column) { return only_number(path, tables, column); });
 }
 
 ListedView view_of(const StarRow& row, bool is_nominal) {
@@ -116,7 +136,7 @@ bool lists_tomograms(const std::filesystem::path& path) {
 
 RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
   const std::vector<StarTable> tables = read_star_file(path);
-  const StarTable* const table = find_table(tables, "rlnTomoTiltSeriesStarFile");
+  const StarTable* const table = find_only_table(path, tables, "rlnTomoTiltSeriesStarFile");
   if (table == nullptr) {
     throw Error(
         fmt::format("'{}' has no column _rlnTomoTiltSeriesStarFile, so it is no "
@@ -131,7 +151,9 @@ RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
     tomogram.tilt_series_star = row.text("rlnTomoTiltSeriesStarFile");
     tomogram.pixel_size_A = row.find_number("rlnTomoTiltSeriesPixelSize");
     tomogram.hand = row.find_number("rlnTomoHand");
+    tomogram.defocus_slope = row.find_number("rlnTomoDefocusSlope");
     tomogram.optics = optics_by([&](const char* column) { return row.find_number(column); });
+    tomogram.mtf = row.find_text("rlnMtfFileName").value_or("");
     tomogram.size_px =
         size_of(row, fmt::format("'{}', tomogram {}", path.string(), quote(tomogram.name)));
     all.tomograms.push_back(std::move(tomogram));
@@ -178,7 +200,7 @@ ViewTable read_relion_views(const std::filesystem::path& path) {
 
 CtfTable read_relion_ctf(const std::filesystem::path& path) {
   const std::vector<StarTable> tables = read_star_file(path);
-  const StarTable* const table = find_table(tables, "rlnDefocusU");
+  const StarTable* const table = find_only_table(path, tables, "rlnDefocusU");
   if (table == nullptr) {
     throw Error(fmt::format(
         "'{}' has no column _rlnDefocusU: give the table of a tilt series that RELION's "

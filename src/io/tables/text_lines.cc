@@ -27,7 +27,8 @@ constexpr int kMostLines = 1 << 20;
 
 template <typename T>
 std::optional<T> parse_whole(std::string_view word) {
-  if (word.starts_with('+')) word.remove_prefix(1);  // from_chars does not accept a plus sign
+  // from_chars does not accept a plus sign.
+  if (word.starts_with('+') && !word.starts_with("+-")) word.remove_prefix(1);
   T value{};
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (error != std::errc{} || end != word.data() + word.size()) return std::nullopt;

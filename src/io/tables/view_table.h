@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "base/plausible.h"
+
 namespace tomofield::io {
 
 /// Where a program puts the centre of N pixels, as a zero-based index of pixels whose middles are
@@ -29,6 +31,12 @@ struct Defocus {
 struct StatedOptics {
   std::optional<double> voltage_kV, spherical_aberration_mm, amplitude_contrast;
 };
+
+/// Voltages that microscopes have.
+inline constexpr base::Interval kVoltages_kV{20, 3000};
+
+/// Throws Error with the file and the value for optics that no microscope has.
+void require_possible(const StatedOptics& optics, const std::filesystem::path& file);
 
 /// One view of a tilt series: where its images lie, and how the specimen is projected to them. With
 /// positions from the centres of the specimen and of the image, the rotations right-handed, and
@@ -56,6 +64,8 @@ struct ViewTable {
   std::vector<ListedView> views;
   std::optional<double> thickness_A;     ///< of the volume that the other program makes
   std::vector<std::string> not_applied;  ///< what the file has and a rigid alignment cannot honour
+  std::vector<std::string> ctf_not_applied{};  ///< the same of the contrast transfer
+  std::vector<std::string> remarks{};          ///< sentences on what the file does not have
   StatedOptics optics{};
   /// 1 or −1: the right or the left side of an aligned view at a positive tilt_deg is farther from
   /// focus. None if the file does not say.

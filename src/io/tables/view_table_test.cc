@@ -65,6 +65,20 @@ TEST(ViewTable, RefusesViewsOfRelionThatAreIncomplete) {
   expect_parts(refusal_of_views(scratch.write("a.star", kRelionHead)), {"lists no views"});
 }
 
+TEST(ViewTable, RefusesTablesOfRelionThatContradictThemselves) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::string& more) {
+    std::string head = kRelionHead;
+    return refusal_of_views(scratch.write("a.star", head + more));
+  };
+  const std::string row = "a.mrc None 0 4 0 0 0 0 3e4 3e4 0 0";
+  expect_parts(refusal("_rlnVoltage #13\n" + row + " 300\n" + row + " 200\n"),
+               {"a.star", "rlnVoltage", "row 2"});
+  expect_parts(refusal("_rlnAmplitudeContrast #13\n" + row + " 7\n"), {"a.star", "contrast of 7"});
+  expect_parts(refusal(row + "\n\ndata_more\nloop_\n_rlnMicrographName #1\nb.mrc\n"),
+               {"a.star", "several tables", "rlnMicrographName"});
+}
+
 TEST(RelionTomograms, AreReadWithTheirColumns) {
   const ScratchDirectory scratch;
   const auto path = scratch.write(
@@ -158,8 +172,8 @@ TEST(ViewTable, ReadsATomostarWithTheSignsOfWarp) {
   EXPECT_EQ(table.views[0].dose_before, 116.1);
   EXPECT_TRUE(table.not_applied.empty());
   const auto without = read_view_table(scratch.write("b.tomostar", head + "a.eer 1 2 3\n"));
-  ASSERT_EQ(without.not_applied.size(), 1u);
-  expect_parts(without.not_applied[0], {"shifts"});
+  ASSERT_EQ(without.remarks.size(), 1u);
+  expect_parts(without.remarks[0], {"shifts"});
 }
 
 const std::string kSeriesXml =
@@ -289,6 +303,74 @@ TEST(ViewTable, SubtractsTheMeanMovementOfWarpAndNamesTheRest) {
   ASSERT_EQ(left.not_applied.size(), 2u);
   expect_parts(left.not_applied[0], {"GridMovementX", "mean", "by up to 2 Å"});
   expect_parts(left.not_applied[1], {"GridVolumeWarpZ"});
+}
+
+TEST(ViewTable, TakesTheMeanDefocusOfWarpsGridsAndNamesTheRest) {
+  const ScratchDirectory scratch;
+  const auto read = [&](const std::string& grids) {
+    return read_view_table(scratch.write("a.xml", kSeriesXml + grids + "</TiltSeries>"));
+  };
+  const auto node = [](int x, int z, double value) {
+    return fmt::format("<Node X=\"{}\" Z=\"{}\" Value=\"{}\"/>", x, z, value);
+  };
+  const std::string defocus = grid("GridCTF", "Width=\"2\" Height=\"1\" Depth=\"2\"",
+                                   node(0, 0, 2) + node(1, 0, 4) + node(0, 1, 5) + node(1, 1, 5));
+  const auto found = read(defocus + grid("GridCTFDefocusDelta", "", "<Node Value=\"1\"/>"));
+  ASSERT_TRUE(found.views[0].defocus && found.views[1].defocus);
+  EXPECT_DOUBLE_EQ(found.views[0].defocus->u_A, 35000);
+  EXPECT_DOUBLE_EQ(found.views[1].defocus->v_A, 45000);
+  ASSERT_EQ(found.ctf_not_applied.size(), 1u);
+  expect_parts(found.ctf_not_applied[0], {"GridCTF", "by up to 1 µm"});
+  const auto other = read(
+      defocus + grid("GridCTFPhase", "Depth=\"3\"", node(0, 0, 1) + node(0, 1, 1) + node(0, 2, 1)));
+  EXPECT_FALSE(other.views[0].defocus);
+  ASSERT_EQ(other.ctf_not_applied.size(), 2u);
+  expect_parts(other.ctf_not_applied[1], {"GridCTFPhase", "2"});
+  for (const char* name : {"GridAngleX", "GridDoseWeights"}) {
+    const auto noted = read(grid(name, "", "<Node Value=\"3\"/>"));
+    ASSERT_EQ(noted.not_applied.size(), 1u);
+    expect_parts(noted.not_applied[0], {name});
+  }
+  EXPECT_TRUE(read(grid("GridDoseWeights", "", "<Node Value=\"1\"/>")).not_applied.empty());
+}
+
+TEST(ViewTable, RefusesGridsAndElementsOfWarpThatContradictThemselves) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::string& more) {
+    return refusal_of_views(scratch.write("a.xml", kSeriesXml + more + "</TiltSeries>"));
+  };
+  const std::string node = "<Node Z=\"0\" Value=\"3\"/>", later = "<Node Z=\"1\" Value=\"3\"/>";
+  const std::string rigid = grid("GridCTF", "Depth=\"2\"", node + later);
+  EXPECT_EQ(refusal(rigid), "");
+  expect_parts(refusal(rigid + rigid), {"a.xml", "<GridCTF>", "twice"});
+  expect_parts(refusal("<Angles>1\n2</Angles>"), {"a.xml", "<Angles>", "twice"});
+  expect_parts(refusal(grid("GridCTF", "Depth=\"2\"", node + node)), {"GridCTF", "Z=0", "twice"});
+  expect_parts(refusal(grid("GridCTF", "Depth=\"2\"", node)), {"GridCTF", "1 nodes"});
+  expect_parts(refusal(grid("GridCTF", "Depth=\"1\"", later)), {"GridCTF", "Z=\"1\""});
+  expect_parts(refusal(grid("GridCTF", "Width=\"abc\"", node)), {"GridCTF", "Width", "abc"});
+  const auto param = [](const char* name, const char* value) {
+    return fmt::format("<Param Name=\"{}\" Value=\"{}\"/>", name, value);
+  };
+  const auto ctf = [](const std::string& params) { return "<CTF>" + params + "</CTF>"; };
+  expect_parts(refusal(ctf(param("Cs", "2.7") + param("Cs", "2"))), {"Cs", "twice"});
+  for (const auto& [name, value] :
+       {std::pair{"Voltage", "300000"}, {"Voltage", "0"}, {"Cs", "-2.7"}, {"Amplitude", "7"}})
+    expect_parts(refusal(ctf(param(name, value))), {"a.xml", value});
+}
+
+TEST(ViewTable, NamesImagesThatAreStretchedOrListedTwice) {
+  const ScratchDirectory scratch;
+  const auto read = [&](const std::string& matrix) {
+    std::string text = kSeriesXml + "</TiltSeries>";
+    text.insert(text.find(" LevelAngleX"), " MagnificationCorrection=\"" + matrix + "\"");
+    return read_view_table(scratch.write("a.xml", text));
+  };
+  EXPECT_TRUE(read("1, 0, 0, 1").not_applied.empty());
+  ASSERT_EQ(read("1.05, 0, 0, 0.95").not_applied.size(), 1u);
+  expect_parts(read("1.05, 0, 0, 0.95").not_applied[0], {"MagnificationCorrection"});
+  const std::string row = "a.mrc None 0 4 0 0 0 0 3e4 3e4 0 0\n";
+  expect_parts(refusal_of_views(scratch.write("a.star", kRelionHead + row + row)),
+               {"a.star", "a.mrc", "two views"});
 }
 
 TEST(ViewTable, RefusesXmlThatIsNoSeries) {

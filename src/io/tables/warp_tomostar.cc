@@ -31,7 +31,7 @@ ViewTable read_warp_tomostar(const std::filesystem::path& path) {
     views.views.push_back(std::move(view));
   }
   if (!tables.front().has_column("wrpAxisOffsetX"))
-    views.not_applied.emplace_back(
+    views.remarks.emplace_back(
         "it has no shifts, so the views are aligned only by angles; "
         "the XML file of an aligned series has them");
   return views;

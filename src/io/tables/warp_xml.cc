@@ -2,10 +2,14 @@
 #include <strings.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <pugixml.hpp>
+#include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -38,7 +42,7 @@ class WarpXml {
   // Returns the lines of an element, or none if there is no such element.
   std::vector<std::string> lines(const char* element) const {
     std::vector<std::string> found;
-    const std::string_view text = root_.child(element).text().get();
+    const std::string_view text = child(element).text().get();
     for (std::size_t at = 0; at < text.size();) {
       const std::size_t end = std::min(text.find('\n', at), text.size());
       const std::string_view line = trim(text.substr(at, end - at));
@@ -79,6 +83,16 @@ class WarpXml {
     return *text == '\0' ? 0.0 : parse(name, text, base::kLargestAngle_deg);
   }
 
+  // Tells whether the images are stretched: MagnificationCorrection is a matrix "1, 0, 0, 1".
+  bool is_stretched() const {
+    const std::string_view text = root_.attribute("MagnificationCorrection").value();
+    std::string unit;
+    for (const char c : text)
+      if (c != ' ' && c != '.') unit += c;
+    std::erase(unit, '\t');
+    return !unit.empty() && unit != "1,0,0,1";
+  }
+
   // Returns the hand of the defocus. Warp adds the height z = X sin(angle) of a point to the
   // defocus, or −X sin(angle) if AreAnglesInverted is set (TiltSeries.cs, GetPositionInAllTilts).
   // Its angles are minus those of a view table.
@@ -109,66 +123,63 @@ class WarpXml {
                     path_.string(), quote(root_.attribute(name).value()), name, count));
   }
 
-  // The movements along an axis: the mean of each view, and the largest distance of a node from it.
-  struct Movements {
+  // What a grid says of the views: the mean of each, and the largest distance of a node from it.
+  struct ValuesOfViews {
     std::vector<double> means;
     double largest_rest = 0.0;
   };
 
-  // Returns the movements of a grid, whose outer nodes lie on the edges of the views. Nothing if it
-  // has some other number of views.
-  std::optional<Movements> movements_of_grid(const char* name, std::size_t num_views) const {
-    if (is_zero(name)) return Movements{std::vector<double>(num_views, 0.0)};
-    const auto depth =
-        static_cast<std::size_t>(std::max(root_.child(name).attribute("Depth").as_int(1), 0));
+  // Returns the values of a grid, whose outer nodes lie on the edges of the views. Nothing if it
+  // has some other number of views. Zeros if there is no such grid.
+  std::optional<ValuesOfViews> values_of_grid(const char* name, std::size_t num_views) const {
+    if (is_all(name, 0.0)) return ValuesOfViews{std::vector<double>(num_views, 0.0)};
+    const Grid grid = read_grid(name);
+    const std::size_t depth = grid.depth;
     if (depth != 1 && depth != num_views) return std::nullopt;
-    const std::vector<GridNode> nodes = nodes_of_grid(name);
     std::vector<double> sums(depth), weights(depth);
-    for (const GridNode& node : nodes) {
+    for (const GridNode& node : grid.nodes) {
       sums[node.layer] += node.weight * node.value;
       weights[node.layer] += node.weight;
     }
-    if (std::ranges::any_of(weights, [](double weight) { return !(weight > 0.0); }))
-      return std::nullopt;
-    Movements found;
+    ValuesOfViews found;
     for (std::size_t view = 0; view < num_views; ++view) {
       const std::size_t layer = depth == 1 ? 0 : view;
       found.means.push_back(sums[layer] / weights[layer]);
     }
-    for (const GridNode& node : nodes)
+    for (const GridNode& node : grid.nodes)
       found.largest_rest = std::max(found.largest_rest,
                                     std::fabs(node.value - sums[node.layer] / weights[node.layer]));
     return found;
   }
 
-  // Returns a value of each view from a grid. Nothing if there is no such grid, or if it varies
-  // within a view or has some other number of views.
-  std::optional<std::vector<double>> values_of_grid(const char* name, std::size_t num_views) const {
-    const pugi::xml_node grid = root_.child(name);
-    const auto nodes = static_cast<std::size_t>(
-        std::distance(grid.children("Node").begin(), grid.children("Node").end()));
-    const bool is_rigid = grid.attribute("Width").as_int(1) == 1 &&
-                          grid.attribute("Height").as_int(1) == 1 &&
-                          (nodes == 1 || nodes == num_views);
-    if (!is_rigid) return std::nullopt;
-    std::vector<double> values(num_views);
-    for (const pugi::xml_node node : grid.children("Node")) {
-      const double value = parse(name, node.attribute("Value").value(), base::kLargestPosition_px);
-      if (nodes == 1) return std::vector<double>(num_views, value);
-      const auto view = parse_integer(node.attribute("Z").value());
-      if (!view || *view < 0 || static_cast<std::size_t>(*view) >= num_views) return std::nullopt;
-      values[static_cast<std::size_t>(*view)] = value;
-    }
-    return values;
-  }
-
   // Returns a parameter of the element CTF.
   std::optional<double> ctf_parameter(const char* name) const {
-    const pugi::xml_node found = root_.child("CTF").find_child_by_attribute("Param", "Name", name);
-    return found ? std::optional(parse(name, found.attribute("Value").value(), 1e6)) : std::nullopt;
+    const auto is_named = [&](const pugi::xml_node& param) {
+      return std::string_view(param.attribute("Name").value()) == name;
+    };
+    const auto params = child("CTF").children("Param");
+    const auto found = std::find_if(params.begin(), params.end(), is_named);
+    if (found == params.end()) return std::nullopt;
+    if (std::find_if(std::next(found), params.end(), is_named) != params.end())
+      fail_twice(fmt::format("the parameter {} of <CTF>", name));
+    return parse(name, found->attribute("Value").value(), 1e6);
   }
 
-  bool is_zero(const char* grid) const { return is_zero_grid(root_.child(grid)); }
+  // Returns true if all nodes of a grid have one value, or if there is no such grid.
+  bool is_all(const char* grid, double value) const {
+    return std::ranges::all_of(child(grid).children("Node"), [&](const pugi::xml_node& node) {
+      const auto found = parse_number(trim(node.attribute("Value").value()));
+      return found && *found == value;
+    });
+  }
+
+  // Returns the names of all grids.
+  std::set<std::string> grids() const {
+    std::set<std::string> names;
+    for (const pugi::xml_node node : root_.children())
+      if (const std::string name = node.name(); name.starts_with("Grid")) names.insert(name);
+    return names;
+  }
 
  private:
   // A node of a grid: its layer, its value, and its share in the mean of the layer.
@@ -176,28 +187,64 @@ class WarpXml {
     std::size_t layer;
     double value, weight;
   };
-
-  std::vector<GridNode> nodes_of_grid(const char* name) const {
-    const pugi::xml_node grid = root_.child(name);
+  struct Grid {
+    std::size_t depth;
     std::vector<GridNode> nodes;
-    for (const pugi::xml_node node : grid.children("Node")) {
-      const auto place = [&](const char* axis, const char* side) {
-        const int count = grid.attribute(side).as_int(1);
-        const auto index = parse_integer(node.attribute(axis).value()).value_or(0);
-        if (index >= 0 && index < count) return std::pair{static_cast<int>(index), count};
-        throw Error(fmt::format("'{}': a node of {} has {} {}, and there are {}", path_.string(),
-                                name, axis, index, count));
+  };
+
+  [[noreturn]] void fail_twice(const std::string& what) const {
+    throw Error(fmt::format("'{}': {} comes twice: leave one out", path_.string(), what));
+  }
+
+  // Returns an element of the series, which may not be there.
+  pugi::xml_node child(const char* name) const {
+    const pugi::xml_node found = root_.child(name);
+    if (found.next_sibling(name)) fail_twice(fmt::format("<{}>", name));
+    return found;
+  }
+
+  // Returns the number of a grid's nodes along a side. A side that is not stated has one.
+  std::int64_t side_of(const pugi::xml_node& grid, const char* side, std::int64_t unstated) const {
+    const std::string_view text = grid.attribute(side).value();
+    if (text.empty()) return unstated;
+    const auto count = parse_integer(text);
+    if (count && *count >= 1 && *count <= kMostNodes) return *count;
+    throw Error(fmt::format("'{}': {}=\"{}\" of {} is not a number of nodes: correct it",
+                            path_.string(), side, quote(text), grid.name()));
+  }
+
+  // Reads a grid, each of whose places has one node.
+  Grid read_grid(const char* name) const {
+    const pugi::xml_node grid = child(name);
+    const auto nodes = grid.children("Node");
+    const std::int64_t num_nodes = std::distance(nodes.begin(), nodes.end());
+    const std::int64_t width = side_of(grid, "Width", 1), height = side_of(grid, "Height", 1);
+    const std::int64_t depth =
+        side_of(grid, "Depth", std::max<std::int64_t>(1, num_nodes / (width * height)));
+    std::set<std::array<std::int64_t, 3>> places;
+    Grid found{.depth = static_cast<std::size_t>(depth), .nodes = {}};
+    for (const pugi::xml_node node : nodes) {
+      const auto place = [&](const char* axis, std::int64_t count) {
+        const std::string_view text = node.attribute(axis).value();
+        const auto index = text.empty() ? std::optional<std::int64_t>(0) : parse_integer(text);
+        if (index && *index >= 0 && *index < count) return *index;
+        throw Error(fmt::format("'{}': a node of {} has {}=\"{}\", and there are {}",
+                                path_.string(), name, axis, quote(text), count));
       };
+      const std::int64_t x = place("X", width), y = place("Y", height), z = place("Z", depth);
+      if (!places.insert({x, y, z}).second)
+        fail_twice(fmt::format("the node X={} Y={} Z={} of {}", x, y, z, name));
       const double value = parse(name, node.attribute("Value").value(), base::kLargestPosition_px);
-      nodes.push_back({static_cast<std::size_t>(place("Z", "Depth").first), value,
-                       weight_of_node(place("X", "Width")) * weight_of_node(place("Y", "Height"))});
+      found.nodes.push_back({static_cast<std::size_t>(z), value,
+                             weight_of_node(x, width) * weight_of_node(y, height)});
     }
-    return nodes;
+    if (num_nodes == width * height * depth) return found;
+    throw Error(fmt::format("'{}': {} has {} nodes, and {} × {} × {} are stated: correct it",
+                            path_.string(), name, num_nodes, width, height, depth));
   }
 
   // Returns the share of a node in the mean along a side: outer nodes count half.
-  static double weight_of_node(const std::pair<int, int>& place) {
-    const auto [index, count] = place;
+  static double weight_of_node(std::int64_t index, std::int64_t count) {
     return count > 1 && (index == 0 || index == count - 1) ? 0.5 : 1.0;
   }
 
@@ -206,40 +253,41 @@ class WarpXml {
     throw Error(fmt::format("'{}': '{}' in {} is not a number from -{} to {}", path_.string(),
                             quote(text), name, largest, largest));
   }
-  static bool is_zero_grid(const pugi::xml_node& grid) {
-    for (const pugi::xml_node node : grid.children("Node")) {
-      const auto value = parse_number(trim(node.attribute("Value").value()));
-      if (!value || *value != 0.0) return false;
-    }
-    return true;
-  }
 
+  static constexpr std::int64_t kMostNodes = 100000;  // along a side
   std::filesystem::path path_;
   pugi::xml_document document_;
   pugi::xml_node root_;
 };
 
+// Reads a grid that is to give one value to each of some views. Notes what is left out if it varies
+// within views. Returns nothing, with a note, if it has some other number of views.
+std::optional<std::vector<double>> means_of_grid(const WarpXml& xml, const char* name,
+                                                 std::string_view unit, std::size_t num_views,
+                                                 std::vector<std::string>& not_applied) {
+  const auto found = xml.values_of_grid(name, num_views);
+  if (!found) {
+    not_applied.push_back(fmt::format("{} of some other number of views than {}", name, num_views));
+    return std::nullopt;
+  }
+  if (found->largest_rest > 0.0)
+    not_applied.push_back(
+        fmt::format("differences of {} from its mean in a view, by up to {:.3g}{}", name,
+                    found->largest_rest, unit));
+  return found->means;
+}
+
 // Subtracts the shifts that Warp refined beside the offsets of the axis, as Warp does: the mean of
 // each view.
 void apply_movements(const WarpXml& xml, ViewTable& table) {
-  const auto along_x = xml.movements_of_grid("GridMovementX", table.views.size());
-  const auto along_y = xml.movements_of_grid("GridMovementY", table.views.size());
-  if (!along_x || !along_y) {
-    table.not_applied.emplace_back(
-        fmt::format("GridMovementX and GridMovementY are not applied: they are not of {} views",
-                    table.views.size()));
-    return;
-  }
+  const auto means = [&](const char* name) {
+    return means_of_grid(xml, name, " Å", table.views.size(), table.not_applied);
+  };
+  const auto along_x = means("GridMovementX"), along_y = means("GridMovementY");
+  if (!along_x || !along_y) return;
   for (std::size_t i = 0; i < table.views.size(); ++i) {
-    table.views[i].shift_x_A -= along_x->means[i];
-    table.views[i].shift_y_A -= along_y->means[i];
-  }
-  const double rest_A = std::max(along_x->largest_rest, along_y->largest_rest);
-  if (rest_A > 0.0) {
-    table.not_applied.emplace_back(
-        fmt::format("of GridMovementX and GridMovementY the mean of each view is applied; what "
-                    "varies within the views, by up to {:.3g} Å, is not",
-                    rest_A));
+    table.views[i].shift_x_A -= (*along_x)[i];
+    table.views[i].shift_y_A -= (*along_y)[i];
   }
 }
 
@@ -248,17 +296,31 @@ void apply_movements(const WarpXml& xml, ViewTable& table) {
 // grid of the mean is zero before ts_ctf ran.
 void set_defocus(const WarpXml& xml, ViewTable& table) {
   constexpr double kAngstroms_in_um = 1e4, kHalfTurn_deg = 180.0;
-  const std::size_t num_views = table.views.size();
-  const auto means_um = xml.values_of_grid("GridCTF", num_views);
-  if (!means_um || xml.is_zero("GridCTF")) return;
-  const std::vector<double> zeros(num_views);
-  const auto differences_um = xml.values_of_grid("GridCTFDefocusDelta", num_views).value_or(zeros);
-  const auto angles_deg = xml.values_of_grid("GridCTFDefocusAngle", num_views).value_or(zeros);
-  const auto phases = xml.values_of_grid("GridCTFPhase", num_views).value_or(zeros);
-  for (std::size_t i = 0; i < num_views; ++i) {
-    table.views[i].defocus = {kAngstroms_in_um * ((*means_um)[i] + differences_um[i] / 2),
-                              kAngstroms_in_um * ((*means_um)[i] - differences_um[i] / 2),
-                              angles_deg[i], kHalfTurn_deg * phases[i]};
+  if (xml.is_all("GridCTF", 0.0)) return;
+  const auto means = [&](const char* name, std::string_view unit) {
+    return means_of_grid(xml, name, unit, table.views.size(), table.ctf_not_applied);
+  };
+  const auto means_um = means("GridCTF", " µm"), phases = means("GridCTFPhase", " π");
+  const auto differences_um = means("GridCTFDefocusDelta", " µm");
+  const auto angles_deg = means("GridCTFDefocusAngle", "°");
+  if (!means_um || !differences_um || !angles_deg || !phases) return;
+  for (std::size_t i = 0; i < table.views.size(); ++i) {
+    table.views[i].defocus = {kAngstroms_in_um * ((*means_um)[i] + (*differences_um)[i] / 2),
+                              kAngstroms_in_um * ((*means_um)[i] - (*differences_um)[i] / 2),
+                              (*angles_deg)[i], kHalfTurn_deg * (*phases)[i]};
+  }
+}
+
+// Notes the grids that are not read. Weights are 1 and all others 0 where nothing was refined.
+void note_other_grids(const WarpXml& xml, ViewTable& table) {
+  constexpr std::array<std::string_view, 6> kRead{
+      "GridMovementX",       "GridMovementY",       "GridCTF",
+      "GridCTFDefocusDelta", "GridCTFDefocusAngle", "GridCTFPhase"};
+  for (const std::string& grid : xml.grids()) {
+    if (std::ranges::find(kRead, grid) != kRead.end()) continue;
+    if (xml.is_all(grid.c_str(), grid.ends_with("Weights") ? 1.0 : 0.0)) continue;
+    const bool is_warp = grid.starts_with("GridVolumeWarp");
+    table.not_applied.emplace_back(grid + (is_warp ? ", a deformation of the specimen" : ""));
   }
 }
 
@@ -318,9 +380,9 @@ ViewTable read_warp_xml(const std::filesystem::path& path) {
                   xml.ctf_parameter("Amplitude")};
   table.defocus_hand = xml.defocus_hand();
   check_pixels(xml, table);
-  for (const char* grid : {"GridVolumeWarpX", "GridVolumeWarpY", "GridVolumeWarpZ"})
-    if (!xml.is_zero(grid))
-      table.not_applied.emplace_back(fmt::format("{}, a deformation of the specimen", grid));
+  note_other_grids(xml, table);
+  if (xml.is_stretched())
+    table.not_applied.emplace_back("a MagnificationCorrection, which stretches the images");
   return table;
 }
 

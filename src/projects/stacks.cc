@@ -1,4 +1,8 @@
-#include "projects/stack_beside.h"
+#include "projects/stacks.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
 
 #include "io/images/image_stack.h"
 #include "io/images/mrc.h"
@@ -31,6 +35,23 @@ std::optional<fs::path> find_stack_beside(const fs::path& file, const std::strin
   for (const char* extension : {".mrc", ".st", ".mrcs", ".tif", ".tiff"})
     if (const fs::path stack = stem.string() + extension; is_stack(stack)) return stack;
   return std::nullopt;
+}
+
+bool are_other_pixels(double a_A, double b_A) {
+  constexpr double kCalibration = 0.1;
+  return std::fabs(a_A / b_A - 1.0) > kCalibration;
+}
+
+void set_stated_pixel_size(Project& project, const StatedPixelSize& stated, double in_header_A) {
+  if (project.ignores(stated.entry)) return;
+  if (in_header_A == 0.0 || in_header_A == 1.0) {
+    project.set("--pixel-size", fmt::format("{:.6g}", stated.size_A), stated.file, stated.entry);
+  } else if (are_other_pixels(stated.size_A, in_header_A)) {
+    project.warn(
+        fmt::format("'{}' states pixels of {:.6g} Å ({}), and the stack of {:.6g} Å: the "
+                    "latter is taken (give the right size with --pixel-size)",
+                    stated.file.string(), stated.size_A, stated.entry, in_header_A));
+  }
 }
 
 }  // namespace tomofield::projects

@@ -4,6 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "projects/project.h"
+
 namespace tomofield::projects {
 
 /// Returns the stack that belongs to a file of another program, "TS.aln", "TS.mdoc" or
@@ -12,5 +14,19 @@ namespace tomofield::projects {
 /// program is none of them. Returns nothing if there is no stack.
 std::optional<std::filesystem::path> find_stack_beside(const std::filesystem::path& file,
                                                        const std::string& named);
+
+/// A pixel size that an entry of a file states.
+struct StatedPixelSize {
+  std::filesystem::path file;
+  std::string entry;
+  double size_A = 0.0;
+};
+
+/// Sets --pixel-size to what a file states if the header of the stack has no size (`in_header_A` is
+/// 0 or 1). Warns if both differ by more than a tenth, which no calibration changes.
+void set_stated_pixel_size(Project& project, const StatedPixelSize& stated, double in_header_A);
+
+/// Returns whether two sizes are those of other pixels, and not of another calibration.
+bool are_other_pixels(double a_A, double b_A);
 
 }  // namespace tomofield::projects
