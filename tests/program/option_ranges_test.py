@@ -62,6 +62,7 @@ def test_the_end_of_a_range_ends_or_stops(series, flag, value, tmp_path):
     except subprocess.TimeoutExpired:
         run.send_signal(signal.SIGTERM)
         _, said = run.communicate(timeout=60)
-    assert run.returncode in (0, 2, 128 + signal.SIGTERM), (run.returncode, said)
-    assert run.returncode == 0 or said.splitlines()[-1].startswith("tomofield: "), said
+    # Before it has begun, the signal itself ends it.
+    assert run.returncode in (0, 2, 128 + signal.SIGTERM, -signal.SIGTERM), (run.returncode, said)
+    assert run.returncode <= 0 or said.splitlines()[-1].startswith("tomofield: "), said
     assert "internal error" not in said and "bad_alloc" not in said, said

@@ -143,6 +143,12 @@ TEST(SampleBox, EulerAnglesAreRelions) {
   EXPECT_EQ(rotation_from_euler(0, 0, 0), kNoRotation);
 }
 
+TEST(SampleBox, AnglesThatTurnNothingAreRefused) {
+  EXPECT_NO_THROW(rotation_from_euler(-720, 90, 1e4));
+  for (const double bad : {1e300, -1e6, std::nan(""), HUGE_VAL})
+    EXPECT_THROW(rotation_from_euler(0, bad, 0), Error) << bad;
+}
+
 TEST(SampleBox, BoxesFillTheirCornersWithWholeVoxels) {
   const OrientedBox box = box_between({10, 4, 0}, {110, 121, 21.5}, 2.0);
   EXPECT_EQ(box.size, (std::array<std::int64_t, 3>{50, 58, 10}));
