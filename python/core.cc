@@ -157,6 +157,19 @@ class Listener {
   py::object callback_;
 };
 
+// Returns what work makes whose steps a listener follows, once all that signals have raised
+// meanwhile was thrown.
+template <typename Work>
+auto run_with(py::object callback, const Work& work) {
+  const Listener listener(std::move(callback));
+  auto made = [&] {
+    const Unlocked unlocked(Unlocked::Stops::kByCallback);
+    return work(listener.callback());
+  }();
+  check_signals();
+  return made;
+}
+
 // Passes messages to the logger "tomofield". Whatever says something runs without the interpreter's
 // lock, which is taken here: else two threads could wait for each other.
 void log(MessageKind kind, std::string_view text) {
@@ -187,14 +200,9 @@ std::pair<option_table::Choices, std::vector<std::string>> open(const std::files
 
 bool align_series(const TiltSeries& series, const option_table::Choices& choices,
                   py::object callback) {
-  const Listener listener(std::move(callback));
-  bool is_finished = false;
-  {
-    const Unlocked unlocked(Unlocked::Stops::kByCallback);
-    is_finished = align(series, choices.options, listener.callback());
-  }
-  check_signals();
-  return is_finished;
+  return run_with(std::move(callback), [&](const ProgressCallback& progress) {
+    return align(series, choices.options, progress);
+  });
 }
 
 // Returns a volume in memory as numbers and the size of a voxel.
@@ -204,13 +212,9 @@ py::tuple to_tuple(Tomogram tomogram) {
 }
 
 py::dict run(const TiltSeries& series, const option_table::Choices& choices, py::object callback) {
-  const Listener listener(std::move(callback));
-  Reconstruction made;
-  {
-    const Unlocked unlocked(Unlocked::Stops::kByCallback);
-    made = reconstruct(series, choices.options, listener.callback());
-  }
-  check_signals();
+  Reconstruction made = run_with(std::move(callback), [&](const ProgressCallback& progress) {
+    return reconstruct(series, choices.options, progress);
+  });
   py::dict result;
   result["is_finished"] = made.is_finished;
   result["metrics"] = made.metrics;
@@ -224,14 +228,9 @@ py::dict run(const TiltSeries& series, const option_table::Choices& choices, py:
 py::dict run_baseline(const TiltSeries& series, BaselineMethod method,
                       const option_table::Choices& choices, const MethodOptions& method_options,
                       py::object callback) {
-  const Listener listener(std::move(callback));
-  Baseline made;
-  {
-    const Unlocked unlocked(Unlocked::Stops::kByCallback);
-    made =
-        reconstruct_baseline(series, method, choices.options, method_options, listener.callback());
-  }
-  check_signals();
+  Baseline made = run_with(std::move(callback), [&](const ProgressCallback& progress) {
+    return reconstruct_baseline(series, method, choices.options, method_options, progress);
+  });
   py::dict result;
   result["is_finished"] = made.is_finished;
   result["metrics"] = made.metrics;

@@ -241,8 +241,9 @@ double face_jump(const Field& field, const Field& decoded, const std::vector<Lea
 }  // namespace
 
 void require_sound(const CodedField& coded) {
-  for (int leaf = 0; leaf < coded.tree.num_leaves(); ++leaf)
-    densities_of(coded.codes, leaf, coded.tree);
+  base::parallel_for("check leaves", coded.tree.num_leaves(), [&](std::int64_t leaf) {
+    densities_of(coded.codes, static_cast<int>(leaf), coded.tree);
+  });
 }
 
 std::unique_ptr<Field> decode_field(const CodedField& coded) {

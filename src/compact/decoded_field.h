@@ -15,7 +15,7 @@ namespace tomofield::compact {
 /// numbers that are no plausible densities.
 std::unique_ptr<field::Field> decode_field(const CodedField& coded);
 
-/// Throws DamagedCode where decode_field() does. Decodes one leaf after the other.
+/// Throws DamagedCode where decode_field() does. Each thread holds one decoded leaf.
 void require_sound(const CodedField& coded);
 
 /// Returns the weight with which neighbouring vertices across the faces of leaves differ as much,

@@ -91,6 +91,25 @@ bool agree(const std::vector<Exposure>& exposures, const io::Mdoc& mdoc) {
   return true;
 }
 
+// Returns how DateTime or ExposureDose contradict the PriorRecordDose of all sections, or nothing.
+// Doses between two sections may be more than that of the first, since views are repeated.
+std::string contradiction_of(const io::Mdoc& mdoc, bool has_doses) {
+  const io::AcquisitionOrder by_time = io::acquisition_order(mdoc);
+  if (by_time.is_stated && contradicts_prior_doses(by_time.sections, mdoc))
+    return "PriorRecordDose falls while DateTime rises";
+  if (!has_doses) return "";
+  Sections order(mdoc.sections.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto prior = [&](std::size_t i) { return *mdoc.sections[i].prior_dose; };
+  std::ranges::sort(order, {}, prior);
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    const double rise = prior(order[i]) - prior(order[i - 1]);
+    if (rise > 0.0 && rise < *mdoc.sections[order[i - 1]].dose / 2)
+      return "PriorRecordDose rises by less than ExposureDose";
+  }
+  return "";
+}
+
 }  // namespace
 
 double critical_exposure(double k, double voltage_kV) {
@@ -128,29 +147,6 @@ bool contradicts_prior_doses(std::span<const std::size_t> order, const io::Mdoc&
   }
   return false;
 }
-
-namespace {
-
-// Returns how DateTime or ExposureDose contradict the PriorRecordDose of all sections, or nothing.
-// Doses between two sections may be more than that of the first, since views are repeated.
-std::string contradiction_of(const io::Mdoc& mdoc, bool has_doses) {
-  const io::AcquisitionOrder by_time = io::acquisition_order(mdoc);
-  if (by_time.is_stated && contradicts_prior_doses(by_time.sections, mdoc))
-    return "PriorRecordDose falls while DateTime rises";
-  if (!has_doses) return "";
-  Sections order(mdoc.sections.size());
-  std::iota(order.begin(), order.end(), 0);
-  const auto prior = [&](std::size_t i) { return *mdoc.sections[i].prior_dose; };
-  std::ranges::sort(order, {}, prior);
-  for (std::size_t i = 1; i < order.size(); ++i) {
-    const double rise = prior(order[i]) - prior(order[i - 1]);
-    if (rise > 0.0 && rise < *mdoc.sections[order[i - 1]].dose / 2)
-      return "PriorRecordDose rises by less than ExposureDose";
-  }
-  return "";
-}
-
-}  // namespace
 
 MdocExposures exposures_of(const io::Mdoc& mdoc) {
   const Sections no_prior = sections_without(mdoc, &io::MdocSection::prior_dose);

@@ -66,6 +66,13 @@ std::vector<std::optional<std::string_view>> split_list(std::string_view text) {
 
 }  // namespace
 
+fs::path command_file_beside(const fs::path& tilt_com, std::string_view program) {
+  const std::string name = tilt_com.filename().string();
+  constexpr std::string_view kTilt = "tilt";
+  const std::string axis = name.starts_with(kTilt) ? name.substr(kTilt.size()) : ".com";
+  return tilt_com.parent_path() / (std::string(program) + axis);
+}
+
 CommandEntries::CommandEntries(Project& project, const fs::path& file, std::string_view program)
     : project_(project), file_(file), command_(find_command(file, program)) {
   project.add_file(file);

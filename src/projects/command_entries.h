@@ -14,6 +14,11 @@
 
 namespace tomofield::projects {
 
+/// Returns the command file of another program of the same axis, which may not be there:
+/// ctfplottera.com beside tilta.com.
+std::filesystem::path command_file_beside(const std::filesystem::path& tilt_com,
+                                          std::string_view program);
+
 /// The entries of one command of a command file, as a project asks for them. Names do not depend on
 /// upper and lower case. An entry that the user ignores is as if it were not there. Each function
 /// notes its entry as known; warn_about_others() tells of those that nobody asked for.

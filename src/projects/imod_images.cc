@@ -195,6 +195,7 @@ ImodImages read_raw(Project& project, const RawFiles& raw, CommandEntries& tilt,
   ImodImages images;
   images.stack = raw.stack.path;
   images.num_sections = stack->header().nz;
+  images.pixel_size_A = stack->header().voxel_size_A[0];
   images.is_raw = true;
   images.series_name = series_name_of(tilt);
   images.bin = find_bin(project, tilt, newst, true);
@@ -217,6 +218,7 @@ ImodImages read_aligned(Project& project, const NamedFile& aligned, CommandEntri
   ImodImages images;
   images.stack = aligned.path;
   images.num_sections = stack->header().nz;
+  images.pixel_size_A = stack->header().voxel_size_A[0];
   images.series_name = series_name_of(tilt);
   images.is_phase_flipped = io::is_in_labels(stack->header(), "ctfphaseflip");
   images.bin = images.unit = find_bin(project, tilt, newst, false);

@@ -13,6 +13,7 @@ namespace tomofield::projects {
 struct ImodImages {
   std::filesystem::path stack;
   std::int64_t num_sections = 0;
+  double pixel_size_A = 0.0;     ///< in the header of `stack`
   bool is_raw = false;           ///< the raw stack and its transforms, else the aligned stack
   double bin = 1;                ///< of the aligned stack
   double unit = 1;               ///< a pixel of `stack`: `bin` if that is aligned

@@ -9,7 +9,6 @@
 #include <system_error>
 #include <vector>
 
-#include "io/images/image_stack.h"
 #include "io/is_file.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/text_lines.h"
@@ -82,10 +81,7 @@ constexpr Refusal kRefusals[] = {
 
 // Returns newst.com for tilt.com, newsta.com for tilta.com, or nothing if it is not there.
 std::optional<fs::path> find_newst(const fs::path& tilt) {
-  const std::string name = tilt.filename().string();
-  constexpr std::string_view kTilt = "tilt";
-  const std::string axis = name.starts_with(kTilt) ? name.substr(kTilt.size()) : ".com";
-  const fs::path newst = tilt.parent_path() / ("newst" + axis);
+  const fs::path newst = command_file_beside(tilt, "newst");
   std::error_code absent;
   if (!fs::exists(newst, absent)) return std::nullopt;
   return newst;
@@ -239,8 +235,7 @@ void read_imod_project(Project& project, const fs::path& tilt_com) {
   const bool has_defocus = set_imod_transfer(project, tilt.file(), images.series_name);
   if (has_defocus && images.is_phase_flipped)
     project.set("--ctf-phase-flipped", "true", images.stack, "ctfphaseflip");
-  const StackPixels pixels{io::open_image_stack(images.stack)->header().voxel_size_A[0],
-                           images.is_raw ? images.bin : 1.0};
+  const StackPixels pixels{images.pixel_size_A, images.is_raw ? images.bin : 1.0};
   set_imod_optics(project, tilt.file(), pixels, has_defocus || project.request().has_transfer);
   tilt.know(kHarmless);
   tilt.warn_about_others();

@@ -91,7 +91,6 @@ void set_detector(Project& project, const io::RelionTomogram& tomogram, const fs
 void warn_of_other_pixels(Project& project, const fs::path& views, const fs::path& star,
                           double stated_A) {
   const double in_header_A = io::open_image_stack(views)->header().voxel_size_A[0];
-  if (in_header_A == 0.0 || in_header_A == 1.0) return;
   if (!are_other_pixels(stated_A, in_header_A)) return;
   project.warn(
       fmt::format("'{}' states pixels of {:.6g} Å (rlnTomoTiltSeriesPixelSize), and the "

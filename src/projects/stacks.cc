@@ -24,6 +24,9 @@ bool is_stack(const fs::path& path) {
   }
 }
 
+// Headers have 0, or 1 of programs that do not know the size.
+bool is_known_size(double in_header_A) { return in_header_A != 0.0 && in_header_A != 1.0; }
+
 }  // namespace
 
 std::optional<fs::path> find_stack_beside(const fs::path& file, const std::string& named) {
@@ -37,14 +40,14 @@ std::optional<fs::path> find_stack_beside(const fs::path& file, const std::strin
   return std::nullopt;
 }
 
-bool are_other_pixels(double a_A, double b_A) {
+bool are_other_pixels(double stated_A, double in_header_A) {
   constexpr double kCalibration = 0.1;
-  return std::fabs(a_A / b_A - 1.0) > kCalibration;
+  return is_known_size(in_header_A) && std::fabs(stated_A / in_header_A - 1.0) > kCalibration;
 }
 
 void set_stated_pixel_size(Project& project, const StatedPixelSize& stated, double in_header_A) {
   if (project.ignores(stated.entry)) return;
-  if (in_header_A == 0.0 || in_header_A == 1.0) {
+  if (!is_known_size(in_header_A)) {
     project.set("--pixel-size", fmt::format("{:.6g}", stated.size_A), stated.file, stated.entry);
   } else if (are_other_pixels(stated.size_A, in_header_A)) {
     project.warn(

@@ -26,7 +26,8 @@ struct StatedPixelSize {
 /// 0 or 1). Warns if both differ by more than a tenth, which no calibration changes.
 void set_stated_pixel_size(Project& project, const StatedPixelSize& stated, double in_header_A);
 
-/// Returns whether two sizes are those of other pixels, and not of another calibration.
-bool are_other_pixels(double a_A, double b_A);
+/// Returns whether the header of a stack has other pixels than those that are stated, and not only
+/// another calibration. A header without a size has not.
+bool are_other_pixels(double stated_A, double in_header_A);
 
 }  // namespace tomofield::projects

@@ -14,6 +14,7 @@
 #include "io/tables/command_file.h"
 #include "io/tables/mtf_table.h"
 #include "io/tables/text_lines.h"
+#include "projects/command_entries.h"
 #include "projects/stacks.h"
 #include "tomofield/error.h"
 
@@ -63,11 +64,8 @@ bool set_transfer_file(Project& project, const fs::path& file, const fs::path& n
 
 // Returns the command files of IMOD's programs for the contrast transfer, which may not be there.
 std::array<fs::path, 2> ctf_commands_of(const fs::path& tilt_com) {
-  const std::string name = tilt_com.filename().string();
-  constexpr std::string_view kTilt = "tilt";
-  const std::string axis = name.starts_with(kTilt) ? name.substr(kTilt.size()) : ".com";
-  const fs::path folder = tilt_com.parent_path();
-  return {folder / ("ctfcorrection" + axis), folder / ("ctfplotter" + axis)};
+  return {command_file_beside(tilt_com, "ctfcorrection"),
+          command_file_beside(tilt_com, "ctfplotter")};
 }
 
 // Returns the entries of a command file, or none if it is not there.
@@ -85,24 +83,24 @@ class OpticsOfCommands {
   OpticsOfCommands(Project& project, const StackPixels& pixels, bool has_transfer)
       : project_(project), pixels_(pixels), has_transfer_(has_transfer) {}
 
-  std::size_t num_used() const { return values_.size(); }
-
-  void take(const fs::path& file, const io::CommandEntry& entry) {
+  // Takes an entry. Returns whether it says something of the microscope.
+  bool take(const fs::path& file, const io::CommandEntry& entry) {
     const std::string name = lower_case(entry.name);
     warn_of_other_transfer(file, entry, name);
     const auto optics = std::ranges::find(kOptics, name, &Optics::entry);
-    if (optics == kOptics.end() || project_.ignores(entry.name)) return;
+    if (optics == kOptics.end() || project_.ignores(entry.name)) return false;
     const std::string where = fmt::format("'{}', line {}", file.string(), entry.line);
     const auto number = io::parse_number(entry.value);
     if (!number || *number <= 0)
       throw Error(fmt::format("{}: '{} {}' is not a number above 0: correct it", where, entry.name,
                               io::quote(entry.value)));
     const auto [other, is_new] = values_.emplace(name, Value{*number, where});
-    if (is_new) return set(*optics, file, entry.name, *number);
+    if (is_new) set(*optics, file, entry.name, *number);
     if (other->second.number != *number)
       throw Error(
           fmt::format("{}: {} is {}, and {} in {}: leave one out, or go on with --ignore {}", where,
                       entry.name, *number, other->second.number, other->second.where, entry.name));
+    return true;
   }
 
  private:
@@ -165,8 +163,10 @@ void set_imod_optics(Project& project, const fs::path& tilt_com, const StackPixe
                      bool has_transfer) {
   OpticsOfCommands optics(project, pixels, has_transfer);
   for (const fs::path& file : ctf_commands_of(tilt_com)) {
-    for (const io::CommandEntry& entry : entries_of(file)) optics.take(file, entry);
-    if (optics.num_used() > 0) project.add_file(file);
+    bool is_used = false;
+    for (const io::CommandEntry& entry : entries_of(file))
+      is_used = optics.take(file, entry) || is_used;
+    if (is_used) project.add_file(file);
   }
 }
 

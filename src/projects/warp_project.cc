@@ -18,11 +18,11 @@ void read_warp_project(Project& project) {
       project.set("--defocus-hand", fmt::format("{}", *table.defocus_hand), path,
                   "AreAnglesInverted");
     }
-  }
-  for (const std::string& what : table.ctf_not_applied)
-    if (!io::has_defocus(table))
+  } else {
+    for (const std::string& what : table.ctf_not_applied)
       project.warn(
           fmt::format("'{}' has {}, so its contrast transfer is not applied", path.string(), what));
+  }
   if (!table.thickness_A) return;
   const double pixel_A = io::open_image_stack(path)->header().voxel_size_A[0];
   if (pixel_A > 0) {

@@ -32,7 +32,7 @@ std::vector<double> parse_numbers(std::string_view text) {
   return numbers;
 }
 
-// What the header states of the whole file, by its name.
+// Holds the numbers that the header states of the whole file, by their names.
 using StatedNumbers = std::map<std::string, std::vector<double>, std::less<>>;
 
 // Parses "# name = numbers" and skips comments of any other form.

@@ -274,9 +274,9 @@ bool read_common_entry(const std::filesystem::path& path, const TextLine& line,
                        const KeyValue& entry, StatedAxes& axes, Mdoc& mdoc) {
   if (entry.key == "PixelSpacing") {
     const double spacing_A = require_spacing_A(path, line, entry.value);
-    if (mdoc.pixel_spacing_A.value_or(0.0) > 0.0 && spacing_A > 0.0)
-      require_same(path, line, entry.key, spacing_A, *mdoc.pixel_spacing_A);
-    if (mdoc.pixel_spacing_A.value_or(0.0) == 0.0) mdoc.pixel_spacing_A = spacing_A;
+    const double before_A = mdoc.pixel_spacing_A.value_or(0.0);
+    if (before_A > 0.0 && spacing_A > 0.0) require_same(path, line, entry.key, spacing_A, before_A);
+    if (before_A == 0.0) mdoc.pixel_spacing_A = spacing_A;
   } else if (entry.key == "TiltAxisAngle") {
     const double axis_deg = require_number(path, line, entry.value, base::kLargestAngle_deg);
     if (!axes.entry) axes.entry = AxisAngle{axis_deg, line.number};

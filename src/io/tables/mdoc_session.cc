@@ -9,8 +9,8 @@
 #include "base/statistics.h"
 #include "io/tables/alignment_files.h"
 
-// What an .mdoc tells of a session beside its geometry: the order of recording, and the defocus
-// that it aimed at.
+// This file finds what an .mdoc tells of a session beside its geometry: the order of recording, and
+// the defocus that it aimed at.
 
 namespace tomofield::io {
 namespace {

@@ -85,12 +85,8 @@ class WarpXml {
 
   // Tells whether the images are stretched: MagnificationCorrection is a matrix "1, 0, 0, 1".
   bool is_stretched() const {
-    const std::string_view text = root_.attribute("MagnificationCorrection").value();
-    std::string unit;
-    for (const char c : text)
-      if (c != ' ' && c != '.') unit += c;
-    std::erase(unit, '\t');
-    return !unit.empty() && unit != "1,0,0,1";
+    const std::vector<double> matrix = list("MagnificationCorrection", base::kLargestNumber);
+    return !matrix.empty() && matrix != std::vector<double>{1, 0, 0, 1};
   }
 
   // Returns the hand of the defocus. Warp adds the height z = X sin(angle) of a point to the
@@ -105,15 +101,8 @@ class WarpXml {
   // Returns the sizes "x, y, z" in an attribute. Nothing if it is not there, as in older versions,
   // or if all are 0, as before anything was reconstructed.
   std::optional<std::vector<double>> dimensions_A(const char* name, std::size_t count) const {
-    std::string_view text = root_.attribute(name).value();
-    if (trim(text).empty()) return std::nullopt;
-    std::vector<double> sizes_A;
-    for (bool is_last = false; !is_last;) {
-      const std::size_t comma = std::min(text.find(','), text.size());
-      sizes_A.push_back(parse(name, text.substr(0, comma), base::kLargestPosition_px));
-      is_last = comma == text.size();
-      text.remove_prefix(std::min(comma + 1, text.size()));
-    }
+    const std::vector<double> sizes_A = list(name, base::kLargestPosition_px);
+    if (sizes_A.empty()) return std::nullopt;
     const auto is_unknown = [](double size_A) { return size_A == 0.0; };
     if (sizes_A.size() == count && std::ranges::all_of(sizes_A, is_unknown)) return std::nullopt;
     if (sizes_A.size() == count && std::ranges::min(sizes_A) > 0.0) return sizes_A;
@@ -123,7 +112,8 @@ class WarpXml {
                     path_.string(), quote(root_.attribute(name).value()), name, count));
   }
 
-  // What a grid says of the views: the mean of each, and the largest distance of a node from it.
+  // Holds what a grid says of the views: the mean of each, and the largest distance of a node from
+  // it.
   struct ValuesOfViews {
     std::vector<double> means;
     double largest_rest = 0.0;
@@ -191,6 +181,20 @@ class WarpXml {
     std::size_t depth;
     std::vector<GridNode> nodes;
   };
+
+  // Returns the numbers "x, y, z" of an attribute; none if it is not there, or empty.
+  std::vector<double> list(const char* name, double largest) const {
+    std::string_view text = root_.attribute(name).value();
+    if (trim(text).empty()) return {};
+    std::vector<double> numbers;
+    for (bool is_last = false; !is_last;) {
+      const std::size_t comma = std::min(text.find(','), text.size());
+      numbers.push_back(parse(name, text.substr(0, comma), largest));
+      is_last = comma == text.size();
+      text.remove_prefix(std::min(comma + 1, text.size()));
+    }
+    return numbers;
+  }
 
   [[noreturn]] void fail_twice(const std::string& what) const {
     throw Error(fmt::format("'{}': {} comes twice: leave one out", path_.string(), what));
