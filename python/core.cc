@@ -47,6 +47,7 @@ py::object numpy_array(const std::string& otherwise, Arguments&&... arguments) {
   try {
     return py::module_::import("numpy").attr("asarray")(std::forward<Arguments>(arguments)...);
   } catch (py::error_already_set& error) {
+    if (!error.matches(PyExc_Exception)) throw;  // of a handler of signals, such as Ctrl-C
     if (!error.matches(PyExc_MemoryError)) throw Error(otherwise);
     throw Error("there is too little memory for a copy of an array that is computed with: " +
                 std::string(py::str(error.value())));
@@ -60,11 +61,17 @@ class StrictConversion {
       : state_(py::module_::import("numpy").attr("errstate")(py::arg("over") = "raise")) {
     state_.attr("__enter__")();
   }
+  // Handlers of signals may run at the first step of Python's function, which then did nothing:
+  // what they raise is kept for check_signals(), and the function is called again.
   ~StrictConversion() {
-    try {
-      state_.attr("__exit__")(py::none(), py::none(), py::none());
-    } catch (py::error_already_set& error) {
-      error.discard_as_unraisable("numpy.errstate");
+    constexpr int kTries = 3;
+    for (int i = 0; i < kTries; ++i) {
+      try {
+        state_.attr("__exit__")(py::none(), py::none(), py::none());
+        return;
+      } catch (py::error_already_set&) {
+        keep_for_later(std::current_exception());
+      }
     }
   }
   StrictConversion(const StrictConversion&) = delete;
@@ -86,10 +93,14 @@ Array<Number> numbers_of(const py::object& object) {
   if (std::string_view("biuf").find(array.dtype().kind()) == std::string_view::npos)
     throw Error("an array of real numbers is needed, not one of type " +
                 py::str(array.dtype()).cast<std::string>());
-  const StrictConversion strict;
-  return numpy_array("an array of type " + py::str(array.dtype()).cast<std::string>() +
-                         " has numbers that are too large",
-                     array, py::dtype::of<Number>(), "C");
+  py::object converted = [&] {
+    const StrictConversion strict;
+    return numpy_array("an array of type " + py::str(array.dtype()).cast<std::string>() +
+                           " has numbers that are too large",
+                       array, py::dtype::of<Number>(), "C");
+  }();
+  check_signals();
+  return converted;
 }
 
 // Hands a vector over to numpy without a copy.
@@ -143,6 +154,7 @@ class Listener {
   ProgressCallback callback() const {
     return [this](const Progress& progress) {
       if (must_stop()) return false;
+      const InCallback in_callback;
       const py::gil_scoped_acquire locked;
       check_signals();
       if (callback_.is_none()) return true;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "base/progress.h"
+#include "base/threads/stoppable_loops.h"
 
 namespace tomofield::python {
 namespace {
@@ -21,7 +22,8 @@ namespace py = pybind11;
 struct Calls {
   std::mutex mutex;
   std::condition_variable has_changed;
-  int count = 0;         // guarded by the mutex, as is the next one
+  int count = 0;         // guarded by the mutex, as are the next ones
+  int in_callbacks = 0;  // of these calls
   bool is_over = false;  // the interpreter ends
 };
 
@@ -39,12 +41,32 @@ thread_local bool t_stops_anywhere = false;
 
 thread_local std::exception_ptr t_raised;  // see keep_for_later()
 
+// Ends the process by Ctrl-C: the interpreter cannot end in order while calls run.
+void end_if_interrupted() {
+  const py::gil_scoped_acquire locked;
+  if (PyErr_CheckSignals() == 0) return;
+  PyErr_Print();
+  constexpr int kInterrupted = 130;
+  _exit(kInterrupted);
+}
+
+// A callback may wait for what the ending thread holds. It gets some seconds, and the interpreter
+// then ends beside it.
 void wait_for_calls() {
   if (getpid() != g_own_process) return;
+  constexpr std::chrono::milliseconds kStep{100}, kPatience{5000};
   const py::gil_scoped_release released;
   std::unique_lock lock(calls().mutex);
   calls().is_over = true;
-  calls().has_changed.wait(lock, [] { return calls().count == 0; });
+  std::chrono::milliseconds in_callbacks{0};
+  while (!calls().has_changed.wait_for(lock, kStep, [] { return calls().count == 0; })) {
+    const bool are_waiting = calls().count == calls().in_callbacks;
+    in_callbacks = are_waiting ? in_callbacks + kStep : kStep * 0;
+    if (in_callbacks >= kPatience) return;
+    lock.unlock();
+    end_if_interrupted();
+    lock.lock();
+  }
 }
 
 }  // namespace
@@ -59,6 +81,16 @@ Unlocked::Counted::~Counted() {
   const std::lock_guard lock(calls().mutex);
   --calls().count;
   calls().has_changed.notify_all();
+}
+
+InCallback::InCallback() {
+  const std::lock_guard lock(calls().mutex);
+  ++calls().in_callbacks;
+}
+
+InCallback::~InCallback() {
+  const std::lock_guard lock(calls().mutex);
+  --calls().in_callbacks;
 }
 
 Unlocked::Unlocked(Stops stops) { t_stops_anywhere = stops == Stops::kAnywhere; }
@@ -81,7 +113,7 @@ void interrupt() {
 }
 
 void interrupt_loop() {
-  if (t_stops_anywhere) interrupt();
+  if (t_stops_anywhere || base::StoppableLoops::are_there()) interrupt();
 }
 
 void keep_for_later(std::exception_ptr raised) { t_raised = std::move(raised); }

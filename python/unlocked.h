@@ -31,6 +31,16 @@ class Unlocked {
   pybind11::gil_scoped_release released_;
 };
 
+/// While it lives, the calling thread is in a callback of the user, who may wait for anything. It
+/// is made and ends without the interpreter's lock.
+class InCallback {
+ public:
+  InCallback();
+  ~InCallback();
+  InCallback(const InCallback&) = delete;
+  InCallback& operator=(const InCallback&) = delete;
+};
+
 /// Returns true once the interpreter ends.
 bool must_stop();
 
@@ -41,6 +51,7 @@ void keep_for_later(std::exception_ptr raised);
 void check_signals();
 
 /// Lets the interpreter wait at its end for what runs in C++, and Ctrl-C stop what has no callback.
+/// It waits for no longer than some seconds for callbacks alone, and Ctrl-C ends the process.
 void wait_at_exit();
 
 }  // namespace tomofield::python

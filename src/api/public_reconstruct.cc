@@ -25,6 +25,9 @@ options::ReconstructOptions internal_options(const TiltSeries& series, const Opt
   const auto& input = TiltSeriesAccess::impl(series);
   auto internal = options::run_options(input.files, options);
   internal.images = input.images;
+  // A callback or another thread may change the folder in which names begin.
+  if (std::filesystem::path& output = internal.run.output; !output.empty())
+    output = std::filesystem::absolute(output);
   return internal;
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/system/memory.h"
+#include "batch/choice.h"
 #include "batch/relion_table.h"
 #include "batch/series_list.h"
 #include "batch/slurm.h"
@@ -25,14 +26,28 @@ constexpr double kGibibyte = 1 << 30;
 
 bool is_star_file(const Series& series) { return series.input.extension() == ".star"; }
 
-// Throws Error if the batch would replace a tomograms.star that is not of an earlier batch.
-void require_own_relion_table(const std::vector<Series>& all, const fs::path& folder) {
-  if (std::ranges::none_of(all, is_star_file) || !io::is_file(relion_table(folder))) return;
-  if (io::is_file(list_of(folder))) return;
-  throw Error(
-      fmt::format("'{}' is not of an earlier batch, which would write a file of this name for "
-                  "RELION: give another folder with --output",
-                  relion_table(folder).string()));
+// Tells whether a folder has the summary or the list of an earlier batch.
+bool is_of_batch(const fs::path& folder) {
+  if (has_summary(folder)) return true;
+  try {
+    return io::is_file(list_of(folder)) && !read_jobs(list_of(folder)).jobs.empty();
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+// Returns the files that a batch writes beside the results, its logs and states among them.
+std::vector<fs::path> own_files(const std::vector<Series>& all, const fs::path& folder) {
+  std::vector<fs::path> files{list_of(folder), summary_table(folder), summary_page(folder),
+                              choice_file(folder), script_of(folder)};
+  if (std::ranges::any_of(all, is_star_file)) files.push_back(relion_table(folder));
+  for (const Series& series : all) {
+    Job job;
+    job.name = series.name;
+    files.push_back(log_of(folder, job));
+    files.push_back(state_file_of(folder, job));
+  }
+  return files;
 }
 
 }  // namespace
@@ -48,7 +63,6 @@ void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::
   check_placeholders(all, options.common, faults);
   if (std::ranges::any_of(all, is_star_file)) outputs.push_back(relion_table(options.folder));
   faults.collect([&] { io::require_no_input_is_replaced(outputs, inputs); });
-  faults.collect([&] { require_own_relion_table(all, options.folder); });
   if (options.skips_existing || options.overwrites) return;
   for (const Series& series : all) {
     if (fs::exists(series.output))
@@ -57,6 +71,18 @@ void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::
                       "replaces it",
                       series.source, series.output.string()));
   }
+}
+
+void require_own_files(const std::vector<Series>& all, const fs::path& folder) {
+  if (is_of_batch(folder)) return;
+  const std::vector<fs::path> files = own_files(all, folder);
+  const auto other =
+      std::ranges::find_if(files, [](const fs::path& file) { return io::is_file(file); });
+  if (other == files.end()) return;
+  throw Error(
+      fmt::format("'{}' is not of an earlier batch, and a batch writes or removes a file of this "
+                  "name: give another folder with --output, or move the file",
+                  other->string()));
 }
 
 void require_room(const std::vector<Job>& jobs, const Room& room) {

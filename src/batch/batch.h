@@ -17,6 +17,11 @@ namespace tomofield::batch {
 /// there are none. Adds all mistakes to `faults`.
 void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::Faults& faults);
 
+/// Throws Error if the batch would replace or remove a file that is called like one of its own, its
+/// list, summary, choice, script, table for RELION, logs and states, and is not of an earlier
+/// batch.
+void require_own_files(const std::vector<Series>& all, const std::filesystem::path& folder);
+
 /// Throws Error with every job that needs more memory than there is, also on one thread.
 void require_room(const std::vector<Job>& jobs, const Room& room);
 

@@ -55,6 +55,8 @@ Needs needs_of(const record::PlanRecord& plan);
 /// Writes the list of a batch, from which the tasks of a job array read their jobs. Throws Error if
 /// it cannot be written, and for words that are no UTF-8.
 void write_jobs(const std::filesystem::path& file, const JobList& list);
+/// Throws Error for words of a list that write_jobs() cannot write.
+void require_words(const JobList& list);
 /// Reads what write_jobs() has written. Throws Error for anything else.
 JobList read_jobs(const std::filesystem::path& file);
 /// Returns the commands of a list that an earlier version may have written, by the names of their

@@ -33,8 +33,8 @@ int trials_at(const json& object) {
 std::string checked_text(const std::string& text) {
   if (base::utf8_text(text) == text) return text;
   throw Error(
-      fmt::format("'{}' is not UTF-8, and the list of a batch cannot hold it: give the file "
-                  "another name",
+      fmt::format("'{}' is not UTF-8, and the list of a batch cannot hold it: give the file or "
+                  "the folder another name",
                   text));
 }
 
@@ -85,6 +85,10 @@ Job job_from(const json& object) {
 }
 
 }  // namespace
+
+void require_words(const JobList& list) {
+  for (const Job& job : list.jobs) job_json(job);
+}
 
 void write_jobs(const fs::path& file, const JobList& list) {
   json jobs = json::array();

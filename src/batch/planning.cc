@@ -20,6 +20,7 @@ namespace fs = std::filesystem;
 using option_table::GivenOption;
 
 GivenOption option_for(const Series& series, GivenOption option, const std::string& where) {
+  if (series.is_tomogram && option.flag == "--series") return option;
   if (option.value) option.value = fill_placeholders(series.input, *option.value, where);
   return option;
 }

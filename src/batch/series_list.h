@@ -20,6 +20,7 @@ struct Series {
   std::filesystem::path input;   ///< what `reconstruct` takes
   std::filesystem::path output;  ///< the tomogram; empty: NAME.mrc in the folder of the batch
   std::vector<option_table::GivenOption> options;  ///< of this series alone
+  bool is_tomogram = false;  ///< a row of RELION's table, whose name --series states as it is
 };
 
 /// A column of a table names an option of `reconstruct`, which a table may or may not set.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +13,7 @@
 #include "base/system/child_process.h"
 #include "batch/packing.h"
 #include "batch/state_record.h"
+#include "io/is_file.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
@@ -65,7 +67,7 @@ double minutes(const std::vector<Job>& jobs, int threads) {
 
 // Returns a name in an option of sbatch, which knows no quotes and reads % as a pattern. A line end
 // in a name would be a command of the script.
-Script name_for_sbatch(const fs::path& path) {
+Script name_for_sbatch(const fs::path& path, std::string_view advice) {
   const std::string name = path.string();
   const auto is_safe = [](unsigned char c) {
     return c > ' ' && c != 0x7f &&
@@ -73,9 +75,9 @@ Script name_for_sbatch(const fs::path& path) {
   };
   if (std::ranges::all_of(name, is_safe)) return Script::made(name);
   throw Error(
-      fmt::format("{} cannot be named in a script for sbatch: give -o a folder without "
-                  "spaces, line ends, quotes, '%' and '#' in its path",
-                  io::quote(name)));
+      fmt::format("{} cannot be named in a script for sbatch: {} without spaces, line ends, "
+                  "quotes, '\\', '%' and '#' in its path",
+                  io::quote(name), advice));
 }
 
 // Returns an option of the user for sbatch, which is one line of the script.
@@ -86,6 +88,21 @@ Script line_for_sbatch(const std::string& option) {
       fmt::format("{} cannot be an option for sbatch: it has a line end or another "
                   "control character",
                   io::quote(option)));
+}
+
+// Returns the number of the job in what sbatch says, the last line of the form NUMBER or
+// NUMBER;CLUSTER. Notes of the site may stand around it.
+std::optional<std::string> job_number_in(std::string_view said) {
+  std::optional<std::string> found;
+  while (!said.empty()) {
+    const std::size_t end = std::min(said.find('\n'), said.size());
+    const std::string_view line = io::trim(said.substr(0, end));
+    const std::string_view number = line.substr(0, line.find(';'));
+    if (!number.empty() && number.find_first_not_of("0123456789") == std::string_view::npos)
+      found = std::string(number);
+    said.remove_prefix(std::min(end + 1, said.size()));
+  }
+  return found;
 }
 
 }  // namespace
@@ -120,13 +137,26 @@ std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jo
   for (const std::string& option : options.more) add(line_for_sbatch(option));
   add(Script::format("--array={}", array_of(jobs)));
   add("--ntasks=1");
-  add(Script::format("--chdir={}", name_for_sbatch(fs::current_path())));
-  add(Script::format("--output={}/slurm-%A_%a.out", name_for_sbatch(logs)));
+  add(Script::format("--chdir={}",
+                     name_for_sbatch(fs::current_path(), "start the command in a folder")));
+  add(Script::format("--output={}/slurm-%A_%a.out", name_for_sbatch(logs, "give -o a folder")));
   add(Script::format("--signal=B:USR1@{}", kWarningSeconds));
   script += Script::format("exec {} batch {} --output {} --task \"$SLURM_ARRAY_TASK_ID\"\n",
                            word(options.program), word(fs::absolute(list_of(options.folder))),
                            word(fs::absolute(options.folder)));
   return script.text();
+}
+
+void require_sbatch() {
+  const char* const path = std::getenv("PATH");
+  std::string_view folders = path == nullptr ? "" : path;
+  while (!folders.empty()) {
+    const std::size_t colon = std::min(folders.find(':'), folders.size());
+    const fs::path program = fs::path(folders.substr(0, colon)) / "sbatch";
+    if (io::is_file(program) && access(program.c_str(), X_OK) == 0) return;
+    folders.remove_prefix(std::min(colon + 1, folders.size()));
+  }
+  throw Error("sbatch is not there: --slurm needs a machine from which jobs are submitted");
 }
 
 std::string submit(const fs::path& folder, std::optional<int> task, const std::string& after) {
@@ -142,8 +172,11 @@ std::string submit(const fs::path& folder, std::optional<int> task, const std::s
     throw Error("sbatch is not there: --slurm needs a machine from which jobs are submitted");
   if (result.exit_status != 0)
     throw Error(fmt::format("sbatch refused '{}': {}", script_of(folder).string(), said));
-  const std::string_view last = std::string_view(said).substr(said.rfind('\n') + 1);
-  return std::string(last.substr(0, last.find(';')));  // NUMBER or NUMBER;CLUSTER
+  if (const auto number = job_number_in(said)) return *number;
+  throw Error(fmt::format(
+      "sbatch was given '{}' and answered '{}', in which no line is the number of a job: look with "
+      "squeue whether it was taken",
+      script_of(folder).string(), io::quote(said)));
 }
 
 }  // namespace tomofield::batch

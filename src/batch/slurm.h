@@ -40,9 +40,12 @@ std::filesystem::path list_of(const std::filesystem::path& folder);
 /// The task that makes the choice for all series (make_choice.h); the jobs are counted from 1.
 inline constexpr int kChoosingTask = 0;
 
+/// Throws Error unless this machine has sbatch.
+void require_sbatch();
+
 /// Submits the script with sbatch: all of its tasks, or one of them. They begin when the Slurm job
 /// `after` has ended, in whatever way, if it is not empty. Returns the number of the Slurm job.
-/// Throws Error with what sbatch says if that fails.
+/// Throws Error with what sbatch says if that fails, or if it answers no number.
 std::string submit(const std::filesystem::path& folder, std::optional<int> task = std::nullopt,
                    const std::string& after = {});
 

@@ -15,6 +15,9 @@ namespace tomofield::batch {
 /// another process that writes them.
 void write_summary(const std::filesystem::path& folder, const std::vector<Job>& jobs);
 
+/// Tells whether a folder has a summary.csv of a batch.
+bool has_summary(const std::filesystem::path& folder);
+
 /// Returns the files of the summary.
 std::filesystem::path summary_table(const std::filesystem::path& folder);
 std::filesystem::path summary_page(const std::filesystem::path& folder);

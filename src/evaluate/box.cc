@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "tomofield/error.h"
+
 namespace tomofield::evaluate {
 
 base::Box whole_box(const base::Shape3& shape) { return {{}, {shape.nx, shape.ny, shape.nz}}; }
@@ -28,6 +30,9 @@ std::string to_text(const base::Box& box) {
 }
 
 base::Volume read_box(const io::MrcReader& file, const base::Box& box) {
+  if (file.header().sections_a_volume > 0)
+    throw Error(fmt::format("'{}' is a stack of volumes (space group 401): give a file of one",
+                            file.path().string()));
   base::Volume volume(box.shape(), file.header().voxel_size_A[0]);
   const base::Shape3& shape = volume.shape;
   std::vector<float> rows(static_cast<std::size_t>(file.header().nx * shape.ny));

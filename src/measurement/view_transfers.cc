@@ -68,56 +68,115 @@ Sections sections_of(const tilt_series::TiltSeriesOptions& input,
   return sections;
 }
 
-// Returns the row of a table for each section. A table that has not one row a section is matched by
-// the rows of AreTomo's alignment, whose dark frames it may leave out, or by tilt. Rows have the
-// contrast transfer (`is_ctf`) or doses. Throws Error if neither tells.
-std::vector<std::optional<std::size_t>> rows_of_sections(
-    const Sections& sections, std::size_t num_rows,
-    std::span<const std::optional<double>> row_tilt_deg, const std::filesystem::path& file,
-    bool is_ctf) {
-  const char* const what = is_ctf ? "contrast transfer" : "doses";
-  std::vector<std::optional<std::size_t>> rows(static_cast<std::size_t>(sections.count));
-  if (static_cast<std::int64_t>(num_rows) == sections.count) {
-    for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = i;
+// A table with a row a view: the contrast transfer, or doses.
+struct RowsOfViews {
+  std::filesystem::path file;
+  bool is_ctf = false;
+  bool is_of_aretomo = false;
+  std::size_t count = 0;
+  std::vector<std::optional<double>> tilt_deg;  // [row]; empty: not in the file
+};
+
+using RowOfSection = std::vector<std::optional<std::size_t>>;  // [section]
+
+// Returns the rows by the sections of AreTomo's alignment, which leaves dark frames out, or nothing
+// if it has another number of rows.
+std::optional<RowOfSection> rows_by_aretomo(const Sections& sections, const RowsOfViews& table) {
+  if (!sections.input.aln) return std::nullopt;
+  const auto alignment = io::read_aretomo_alignment(*sections.input.aln, /*needs_tilt=*/false);
+  if (alignment.rows.size() != table.count) return std::nullopt;
+  const auto assigned =
+      io::assign_aretomo_sections(alignment, *sections.input.aln, sections.count, sections.stack);
+  RowOfSection rows(static_cast<std::size_t>(sections.count));
+  for (std::size_t row = 0; row < table.count; ++row)
+    rows[static_cast<std::size_t>(assigned[row])] = row;
+  return rows;
+}
+
+// Returns the rows by tilt, or nothing if the tilts do not tell.
+std::optional<RowOfSection> rows_by_tilt(const Sections& sections, const RowsOfViews& table) {
+  if (table.tilt_deg.empty()) return std::nullopt;
+  return tilt_series::match_by_tilt(sections.tilt_deg, table.tilt_deg);
+}
+
+// Returns the rows of a table that has one a section. They are in the order of the sections, unless
+// their tilts are those of the sections in another order.
+RowOfSection rows_of_whole_table(const Sections& sections, const RowsOfViews& table) {
+  RowOfSection rows(table.count);
+  std::iota(rows.begin(), rows.end(), std::size_t{0});
+  if (table.tilt_deg.size() != table.count ||
+      !tilt_series::are_other_angles(sections.tilt_deg, table.tilt_deg))
     return rows;
+  auto negated = table.tilt_deg;  // another sign of the tilts is no other order
+  for (auto& tilt_deg : negated)
+    if (tilt_deg) *tilt_deg = -*tilt_deg;
+  const bool has_other_sign = !tilt_series::are_other_angles(sections.tilt_deg, negated);
+  const auto by_tilt = has_other_sign ? std::nullopt : rows_by_tilt(sections, table);
+  if (by_tilt) {
+    base::log_info(fmt::format(
+        "'{}' lists the views in another order than '{}': its rows are matched by their tilts",
+        table.file.string(), sections.stack));
+    return *by_tilt;
   }
-  if (sections.input.aln) {
-    const auto alignment = io::read_aretomo_alignment(*sections.input.aln, /*needs_tilt=*/false);
-    if (alignment.rows.size() == num_rows) {
-      const auto assigned = io::assign_aretomo_sections(alignment, *sections.input.aln,
-                                                        sections.count, sections.stack);
-      for (std::size_t row = 0; row < num_rows; ++row)
-        rows[static_cast<std::size_t>(assigned[row])] = row;
-      return rows;
-    }
-  }
-  if (!row_tilt_deg.empty())
-    if (const auto matched = tilt_series::match_by_tilt(sections.tilt_deg, row_tilt_deg))
-      return *matched;
+  if (table.is_ctf)
+    tilt_series::warn_of_other_angles(sections.tilt_deg, sections.stack, table.tilt_deg,
+                                      fmt::format("'{}'", table.file.string()));
+  return rows;
+}
+
+// Returns the row of a table for each section. Throws Error if neither the number of rows, nor
+// AreTomo's alignment, nor the tilts tell.
+RowOfSection rows_of_sections(const Sections& sections, const RowsOfViews& table) {
+  const bool is_whole = static_cast<std::int64_t>(table.count) == sections.count;
+  if (!is_whole || table.is_of_aretomo)
+    if (const auto rows = rows_by_aretomo(sections, table)) return *rows;
+  if (is_whole) return rows_of_whole_table(sections, table);
+  if (const auto rows = rows_by_tilt(sections, table)) return *rows;
   throw Error(fmt::format(
       "'{}' has the {} of {} sections, but '{}' has {}, and {}: give the file of this stack{}",
-      file.string(), what, num_rows, sections.stack, sections.count,
-      row_tilt_deg.empty() ? "it has no tilts to tell which belong together"
-                           : "their tilts do not tell which belong together",
-      is_ctf ? " (--ctf none goes on without it)" : ""));
+      table.file.string(), table.is_ctf ? "contrast transfer" : "doses", table.count,
+      sections.stack, sections.count,
+      table.tilt_deg.empty() ? "it has no tilts to tell which belong together"
+                             : "their tilts do not tell which belong together",
+      table.is_ctf ? " (--ctf none goes on without it)" : ""));
+}
+
+// Adds the rows that a table of IMOD leaves out after its last one, whose defocus goes on.
+void extend(io::CtfTable& table, std::size_t count) {
+  if (!table.goes_on || table.views.size() >= count) return;
+  table.views.resize(count, table.views.back());
+  table.tilt_deg.resize(count);
 }
 
 // Puts the rows of a table of contrast transfer into the order of the sections.
 void match_sections(const Sections& sections, io::CtfTable& table) {
   const auto count = static_cast<std::size_t>(sections.count);
-  if (table.goes_on && table.views.size() < count) {
-    table.views.resize(count, table.views.back());
-    return;
-  }
-  if (table.views.size() == count && table.tilt_deg.size() == count)
-    tilt_series::warn_of_other_angles(sections.tilt_deg, sections.stack, table.tilt_deg,
-                                      fmt::format("'{}'", table.file.string()));
-  const auto rows = rows_of_sections(sections, table.views.size(), table.tilt_deg, table.file,
-                                     /*is_ctf=*/true);
+  extend(table, count);
+  const RowOfSection rows = rows_of_sections(
+      sections,
+      {table.file, /*is_ctf=*/true, table.is_of_aretomo, table.views.size(), table.tilt_deg});
   std::vector<std::optional<io::Defocus>> matched(count);
   for (std::size_t i = 0; i < count; ++i)
     if (rows[i]) matched[i] = table.views[*rows[i]];
   table.views = std::move(matched);
+}
+
+// Warns of a defocus that no image for phase contrast has, as of a file in µm or of a failed fit.
+void warn_of_small_defocus(const Sections& sections, const io::CtfTable& table) {
+  constexpr double kLeast_A = 1000.0;
+  std::size_t count = 0, first = 0;
+  for (std::size_t i = 0; i < table.views.size(); ++i) {
+    const auto& defocus = table.views[i];
+    if (!defocus || !sections.tilt_deg[i] || (defocus->u_A + defocus->v_A) / 2 >= kLeast_A)
+      continue;
+    if (count++ == 0) first = i;
+  }
+  if (count == 0) return;
+  const io::Defocus& defocus = *table.views[first];
+  base::log_warning(fmt::format(
+      "'{}' has a defocus of {:.4g} Å in section {}, and less than {:.0f} Å in {} of its sections: "
+      "is it under focus, and in the right unit? (--ctf none goes on without it)",
+      table.file.string(), (defocus.u_A + defocus.v_A) / 2, first + 1, kLeast_A, count));
 }
 
 // Returns the contrast transfer of each section, or nothing without any.
@@ -134,6 +193,7 @@ std::optional<io::CtfTable> find_ctf(const SeriesFiles& files, const ViewOptions
   if (!has_ctf_file(files)) return std::nullopt;
   io::CtfTable table = io::read_ctf(*files.ctf);
   match_sections(sections, table);
+  warn_of_small_defocus(sections, table);
   for (const std::string& what : table.not_applied)
     base::log_warning(fmt::format("'{}' has {}, which is not applied", table.file.string(), what));
   base::log_info(fmt::format("ctf: the defocus of each view from '{}'; --ctf none turns it off",
@@ -291,8 +351,8 @@ std::optional<Exposures> find_exposures(const SeriesFiles& files, const ViewOpti
       of_view ? microscope::exposures_in_order(recording->order, *of_view) : *recording->doses;
   require_bearable(of_row,
                    of_view ? "--dose-per-tilt" : fmt::format("'{}'", recording->file.string()));
-  const auto rows = rows_of_sections(sections, of_row.size(), recording->tilt_deg, recording->file,
-                                     /*is_ctf=*/false);
+  const auto rows = rows_of_sections(
+      sections, {.file = recording->file, .count = of_row.size(), .tilt_deg = recording->tilt_deg});
   Exposures of_section(static_cast<std::size_t>(sections.count));
   for (std::size_t i = 0; i < of_section.size(); ++i)
     if (rows[i]) of_section[i] = of_row[*rows[i]];

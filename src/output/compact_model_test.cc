@@ -114,6 +114,9 @@ TEST(CompactModel, NumbersThatNoModelHasAreRefused) {
       model.coded->codes.shapes[1].rank_x = model.coded->codes.shapes[1].nx + 1;
     };
     EXPECT_NE(refusal(more_components, most_bytes).find("components"), std::string::npos);
+    EXPECT_NE(refusal([](Model& model) { model.coded->codes.shapes[1].nz = 4000; }, most_bytes)
+                  .find("impossible shape"),
+              std::string::npos);
     // Every number is plausible, but not what they make together.
     EXPECT_NE(refusal([](Model& model) { model.coded->codes.step[0] = 9e8; }, most_bytes), "");
     EXPECT_EQ(refusal([](Model&) {}, most_bytes), "");

@@ -218,19 +218,21 @@ class ModelReader {
   }
 
   // Refuses more vertices than twice those of the finest field, an eighth of a pixel apart.
-  void require_possible_sides(const field::Quadtree& tree,
+  void require_possible_sides(const field::Quadtree& tree, double thickness,
                               const std::vector<field::LeafShape>& shapes) const {
     constexpr std::int64_t kMostAPixel = 16;
+    const double most_along_z = kMostAPixel * std::max(thickness, 1.0) + 2;
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       const std::int64_t side = tree.leaf(static_cast<int>(i)).square.size;
-      require(std::max(shapes[i].nx, shapes[i].ny) <= kMostAPixel * side + 2,
+      require(std::max(shapes[i].nx, shapes[i].ny) <= kMostAPixel * side + 2 &&
+                  shapes[i].nz <= most_along_z,
               "a leaf has an impossible shape");
     }
   }
 
   // Reads the leaves of a tree, whose nodes the file names as well.
   std::vector<field::LeafShape> read_shapes(const StoredGroup& group, const field::Quadtree& tree,
-                                            int fewest = 2) const {
+                                            double thickness, int fewest = 2) const {
     std::vector<field::LeafShape> shapes(static_cast<std::size_t>(tree.num_leaves()));
     Integers nodes(shapes.size());
     group.read_array<std::int64_t>("node", nodes);
@@ -250,7 +252,7 @@ class ModelReader {
     read("rank_x", &field::LeafShape::rank_x, 0);
     read("rank_y", &field::LeafShape::rank_y, 0);
     read("rank_z", &field::LeafShape::rank_z, 0);
-    require_possible_sides(tree, shapes);
+    require_possible_sides(tree, thickness, shapes);
     return shapes;
   }
 
@@ -303,7 +305,7 @@ class ModelReader {
     make_room([&] {
       field::Quadtree tree = read_tree(group.group("tree"));
       if (choose) kept = choose(tree);
-      auto shapes = read_shapes(group.group("leaves"), tree);
+      auto shapes = read_shapes(group.group("leaves"), tree, thickness);
       const std::string name = group.text("kind");
       const auto kind = base::enum_named<FieldKind>(name);
       if (!kind) fail(fmt::format("there is no field '{}'", name));
@@ -340,7 +342,7 @@ class ModelReader {
     make_room([&] {
       compact::CodedField coded{read_tree(group.group("tree")), read_thickness(group), {}};
       if (choose) kept = choose(coded.tree);
-      coded.codes = read_codes(group, coded.tree);
+      coded.codes = read_codes(group, coded.tree, coded.thickness);
       coded.file = path_;
       const std::size_t bytes = compact::decoded_bytes(coded.codes.shapes, base::thread_count());
       require(bytes < compact::kNoMemoryHolds, "its leaves need more numbers than any file holds");
@@ -358,12 +360,13 @@ class ModelReader {
     require_plausible_parameters(*model.field, fmt::format("'{}' is a damaged model", path_));
   }
 
-  compact::LeafCodes read_codes(const StoredGroup& field, const field::Quadtree& tree) const {
+  compact::LeafCodes read_codes(const StoredGroup& field, const field::Quadtree& tree,
+                                double thickness) const {
     const StoredGroup group = field.group("code");
     const int num_leaves = tree.num_leaves();
     compact::LeafCodes codes{.step = group.read_array<double>("step"),
                              .face_weight = group.read_array<double>("face_weight"),
-                             .shapes = read_shapes(field.group("leaves"), tree, 1),
+                             .shapes = read_shapes(field.group("leaves"), tree, thickness, 1),
                              .offset = group.read_array<std::int64_t>("offset"),
                              .bytes = group.read_array<std::uint8_t>("bytes")};
     require(std::ranges::all_of(codes.shapes, compact::has_possible_ranks),

@@ -307,7 +307,7 @@ TEST(ModelFile, RefusesWhatIsConsistentHdf5ButNoSoundModel) {
       {"f['field'].attrs['bias'] = float('inf')", "bias"},
       {"f['field/leaves/nx'][2] = 1", "impossible shape"},
       {"f['field/leaves/nx'][2] = 8192", "impossible shape"},
-      {"f['field/leaves/nz'][2] = 60000", "more parameters"},
+      {"f['field/leaves/nz'][2] = 60000", "impossible shape"},
       {"for n in 'nx', 'ny', 'nz': f['field/leaves/' + n][:] = 200", "more parameters"},
       {"f['geometry'].attrs['thickness'] = 1e300", "geometry"},
       {"f['field'].attrs['thickness'] = 1e300", "thickness"},
@@ -348,7 +348,8 @@ TEST(ModelFile, RefusesLeavesWhoseNumberOfParametersWraps) {
   model.field = make_field(
       FieldKind::kGrid,
       field::Quadtree(roots, std::vector<field::Region>(kSide * kSide, field::Region::kInterest)),
-      21.5, std::vector<field::LeafShape>(kSide * kSide, {.nx = 2, .ny = 2, .nz = 2}));
+      4096.0, std::vector<field::LeafShape>(kSide * kSide, {.nx = 2, .ny = 2, .nz = 2}));
+  model.geometry.thickness = 4096.0;
   save_model(scratch / "model.h5", model);
   testing::Hdf5Edits edits(read_whole_file(scratch / "model.h5"));
   const auto file = io::read_hdf5_objects(

@@ -1,6 +1,7 @@
 #include "plan/run_estimate.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -10,8 +11,11 @@
 #include <vector>
 
 #include "align/alignment.h"
+#include "base/plausible.h"
 #include "base/progress.h"
 #include "fit/stages.h"
+#include "io/images/mrc_format.h"
+#include "io/images/ome_zarr.h"
 #include "io/saving/output_target.h"
 #include "io/saving/scratch_memory.h"
 #include "measurement/prepare.h"
@@ -19,6 +23,7 @@
 #include "measurement/surrogate_views.h"
 #include "measurement/view_transfers.h"
 #include "microscope/view_filter.h"
+#include "output/volume.h"
 #include "plan/step_times.h"
 #include "tune/tuning.h"
 
@@ -189,15 +194,25 @@ std::size_t parameter_bytes(const RunPlan& run) {
 }
 
 // Returns the bytes of the volumes: of halves the tomogram, both halves, the uncertainty and the
-// local resolution.
-std::size_t volume_bytes(const RunPlan& run, const VolumeOptions& options) {
-  const std::size_t num_volumes = run.num_fits == 1 ? 1 : 5;
-  const double bytes_a_voxel = options.voxel_type == VoxelType::kFloat32 ? 4 : 2;
-  return num_volumes * static_cast<std::size_t>(num_voxels(run) * bytes_a_voxel);
+// local resolution, and those for other denoisers. The tomogram and the halves may have an
+// OME-Zarr.
+std::size_t volume_bytes(const RunPlan& run, const options::ReconstructOptions& options) {
+  const bool has_halves = run.num_fits > 1;
+  const std::int64_t num_volumes = !has_halves ? 1 : options.fit.denoising_halves ? 7 : 5;
+  const io::MrcMode mode = output::mrc_mode(options.volume.voxel_type);
+  const double bytes_of_one = num_voxels(run) * static_cast<double>(io::bytes_per_value(mode));
+  base::CheckedSize bytes =
+      base::CheckedSize(num_volumes) * static_cast<std::int64_t>(bytes_of_one);
+  if (options.volume.zarr) {
+    const std::array<std::int64_t, 3> size{run.roi.width(), run.roi.height(),
+                                           std::llround(run.thickness)};
+    bytes = bytes + base::CheckedSize(has_halves ? 3 : 1) * io::ome_zarr_bytes(size, mode);
+  }
+  return static_cast<std::size_t>(bytes.find().value_or(std::numeric_limits<std::int64_t>::max()));
 }
 
 // Returns the bytes of the volumes and models that stay. The codes of tiles are small.
-std::size_t large_file_bytes(const RunPlan& run, const VolumeOptions& options) {
+std::size_t large_file_bytes(const RunPlan& run, const options::ReconstructOptions& options) {
   return volume_bytes(run, options) + (run.tiles.is_used() ? 0 : parameter_bytes(run));
 }
 
@@ -219,7 +234,7 @@ RunEstimate estimate_run(const tilt_series::PlannedSeries& series,
   plan.transfers = measurement::view_transfers(options.input(), options.specimen.hand, series);
   RunEstimate estimate;
   const std::size_t parameters = parameter_bytes(run);
-  estimate.result_bytes = large_file_bytes(run, options.volume) + kSmallFiles;
+  estimate.result_bytes = large_file_bytes(run, options) + kSmallFiles;
   // A checkpoint has the parameters and two moments, and is there twice while it is replaced. With
   // tiles it is that of the coarse stages.
   const std::size_t in_checkpoint =
@@ -247,7 +262,7 @@ void require_disk(const RunPlan& run, const options::ReconstructOptions& options
   const std::filesystem::path& output = options.run.output;
   if (output.empty()) return;
   io::require_room(io::folder_of(output), output,
-                   static_cast<std::int64_t>(large_file_bytes(run, options.volume)));
+                   static_cast<std::int64_t>(large_file_bytes(run, options)));
 }
 
 }  // namespace tomofield::plan

@@ -102,6 +102,13 @@ TEST_F(Estimate, DiskHoldsTheResultsAndTwoCheckpoints) {
   EXPECT_GT(estimated.disk_bytes, estimated.result_bytes);
   options_.volume.voxel_type = VoxelType::kFloat16;
   EXPECT_EQ(estimate().result_bytes, estimated.result_bytes - 2 * voxels);
+  options_.volume.zarr = true;
+  EXPECT_GE(estimate().result_bytes, estimated.result_bytes);  // 2 bytes a voxel, and more
+  options_.volume.zarr = false;
+  options_.fit.split_tilts = true;
+  const std::size_t of_halves = estimate().result_bytes;
+  options_.fit.denoising_halves = true;
+  EXPECT_EQ(estimate().result_bytes, of_halves + 2 * 2 * voxels);
 }
 
 TEST_F(Estimate, TheTimeOfTheRayEngineIsNotKnown) {

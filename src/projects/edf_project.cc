@@ -45,18 +45,24 @@ std::optional<fs::path> first_file(const fs::path& stem, std::array<const char*,
   return std::nullopt;
 }
 
-// Sets the tilt axis, as eTomo's dialog of a new dataset has it.
+// Sets the tilt axis, as eTomo's dialog of a new dataset has it. Old versions write it for both
+// axes of a dataset.
 void set_axis(Project& project, const fs::path& edf, const Entries& entries) {
-  constexpr const char* kEntry = "Setup.ImageRotationA";
-  const std::string text = value_of(entries, kEntry);
-  if (text.empty() || project.ignores(kEntry)) return;
+  const char* const entry =
+      entries.contains("Setup.ImageRotationA") ? "Setup.ImageRotationA" : "Setup.ImageRotation";
+  const std::string text = value_of(entries, entry);
+  if (text.empty() || project.ignores(entry)) return;
   const auto axis_deg = io::parse_number(text, base::kLargestAngle_deg / 2);
   if (!axis_deg)
     throw Error(
         fmt::format("'{}': {} is '{}', which is no angle of a tilt axis: correct it, or go "
                     "on with --ignore {}",
-                    edf.string(), kEntry, io::quote(text), kEntry));
-  project.set("--tilt-axis", fmt::format("{}", *axis_deg), edf, kEntry);
+                    edf.string(), entry, io::quote(text), entry));
+  project.set("--tilt-axis", fmt::format("{}", *axis_deg), edf, entry);
+  project.warn(
+      fmt::format("'{}' is not aligned yet (no .xf): without --align full its views are turned by "
+                  "the image rotation, and not shifted",
+                  edf.string()));
 }
 
 // Sets the pixel size, which eTomo writes in nm, if the stack has none.
@@ -117,10 +123,11 @@ void read_edf_project(Project& project) {
         edf.string()));
   }
   if (value_of(entries, "Setup.AxisType").starts_with("Dual")) {
-    throw Error(fmt::format(
-        "'{}' is of two axes, which are reconstructed one by one: name tilta.com or tiltb.com, or "
-        "give a stack itself with its options",
-        edf.string()));
+    throw Error(
+        fmt::format("'{}' is of two axes, which are reconstructed one by one: name tilta.com or "
+                    "tiltb.com, which "
+                    "eTomo writes, or give a stack itself with its options",
+                    edf.string()));
   }
   if (value_of(entries, "Setup.ViewType").starts_with("Montage")) {
     throw Error(fmt::format(

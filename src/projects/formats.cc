@@ -30,8 +30,10 @@ constexpr Format kFormats[] = {
      .read = read_warp_project},
     {.name = "Warp's XML",
      .extension = ".xml",
-     .is_main_file = [](std::string_view) { return false; },  // frames have XML files too
-     .read = read_warp_project},
+     .is_main_file = [](std::string_view name) { return name.ends_with(".xml"); },
+     .word = "<TiltSeries",  // frames have XML files too
+     .read = read_warp_project,
+     .rank = 1},
     {.name = "eTomo's dataset (.edf)",
      .extension = ".edf",
      .is_main_file = [](std::string_view name) { return name.ends_with(".edf"); },
@@ -40,6 +42,7 @@ constexpr Format kFormats[] = {
     {.name = "SerialEM's metadata (.mdoc)",
      .extension = ".mdoc",
      .is_main_file = [](std::string_view name) { return name.ends_with(".mdoc"); },
+     .word = "[ZValue",  // movies have files with [FrameSet = 0] alone
      .read = read_mdoc_project,
      .rank = 2},
 };

@@ -26,7 +26,8 @@ namespace {
 
 // These choose how IMOD's tilt back-projects, filters and writes; this program's fit has options of
 // its own for what it has of them.
-constexpr std::array<std::string_view, 37> kHarmless{"OutputFile",
+constexpr std::array<std::string_view, 38> kHarmless{"OutputFile",
+                                                     "ReferenceSDofScaling",
                                                      "AdjustOrigin",
                                                      "RADIAL",
                                                      "FalloffIsTrueSigma",
@@ -235,7 +236,7 @@ void read_imod_project(Project& project, const fs::path& tilt_com) {
   const bool has_defocus = set_imod_transfer(project, tilt.file(), images.series_name);
   if (has_defocus && images.is_phase_flipped)
     project.set("--ctf-phase-flipped", "true", images.stack, "ctfphaseflip");
-  const StackPixels pixels{images.pixel_size_A, images.is_raw ? images.bin : 1.0};
+  const StackPixels pixels{images.pixel_size_A, images.bin, images.is_raw};
   set_imod_optics(project, tilt.file(), pixels, has_defocus || project.request().has_transfer);
   tilt.know(kHarmless);
   tilt.warn_about_others();

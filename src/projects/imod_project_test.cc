@@ -338,31 +338,47 @@ TEST(ImodProject, TheDefocusFileOfTheCommandsComesFirst) {
   imod.folder.write("other.defocus", defocus);
   imod.folder.write("ctfcorrection.com",
                     "$ctfphaseflip -StandardInput\nDefocusFile other.defocus\n"
-                    "DegPhaseShift 90\nInvertTiltAngles 0\n");
+                    "PhaseShiftInDegrees 90\nInvertTiltAngles 0\n");
   EXPECT_EQ(imod.values().at("--ctf"), (imod.folder / "other.defocus").string());
-  expect_parts(imod.warnings(), {"ctfcorrection.com", "line 3", "DegPhaseShift"});
-  EXPECT_EQ(imod.warnings({"DegPhaseShift"}), "");
+  expect_parts(imod.warnings(), {"ctfcorrection.com", "line 3", "PhaseShiftInDegrees"});
+  EXPECT_EQ(imod.warnings({"PhaseShiftInDegrees"}), "");
   std::filesystem::rename(imod.folder / "other.defocus", imod.folder / "TS.defocus");
   EXPECT_EQ(imod.values().at("--ctf"), (imod.folder / "TS.defocus").string());
 }
 
-// The size is in nm, and that of binned pixels of the aligned stack.
+// The size is in nm: ctfphaseflip's is that of binned pixels of the aligned stack.
 TEST(ImodProject, ThePixelSizeOfTheCommandsIsTakenOrCompared) {
   const ImodFolder imod;
   imod.write_newst("BinByFactor 2\n");
   imod.write_tilt("THICKNESS 900\nIMAGEBINNED 2\n");
-  const double in_header_A = io::open_image_stack(imod.folder / "TS.st")->header().voxel_size_A[0];
-  ASSERT_GT(in_header_A, 1.0);
-  const auto write = [&](double size_nm) {
-    imod.folder.write("ctfcorrection.com",
-                      fmt::format("$ctfphaseflip -StandardInput\nPixelSize {}\n", size_nm));
+  const double in_header_nm =
+      io::open_image_stack(imod.folder / "TS.st")->header().voxel_size_A[0] / 10;
+  ASSERT_GT(in_header_nm, 0.1);
+  const auto write = [&](const char* command, const std::string& entries) {
+    imod.folder.write(std::string("ctf") + command + ".com", "$ctf\n" + entries);
   };
-  write(in_header_A / 5);
+  const auto size = [](double nm) { return fmt::format("PixelSize {}\n", nm); };
+  write("correction", size(2 * in_header_nm));
   EXPECT_EQ(imod.warnings().find("states pixels of"), std::string::npos) << imod.warnings();
-  write(in_header_A);
+  write("correction", size(4 * in_header_nm));
   expect_parts(imod.warnings(), {"ctfcorrection.com", "states pixels of", "PixelSize"});
   EXPECT_EQ(imod.warnings({"PixelSize"}).find("states pixels of"), std::string::npos);
   EXPECT_FALSE(imod.values().contains("--pixel-size"));
+
+  // That of ctfplotter is of the raw stack. UnbinnedPixelSize says the same.
+  write("plotter", size(in_header_nm));
+  for (const std::string& of_aligned :
+       {size(in_header_nm), size(2 * in_header_nm),
+        size(2 * in_header_nm) + fmt::format("UnbinnedPixelSize {}\n", in_header_nm)}) {
+    write("correction", of_aligned);
+    EXPECT_EQ(imod.refusal(), "") << of_aligned;
+    EXPECT_EQ(imod.warnings().find("states pixels of"), std::string::npos) << imod.warnings();
+  }
+  write("correction", size(3 * in_header_nm));
+  expect_parts(imod.refusal(), {"ctfcorrection.com", "PixelSize", "ctfplotter.com"});
+  write("correction", "");
+  write("plotter", size(2 * in_header_nm));
+  expect_parts(imod.warnings(), {"ctfplotter.com", "states pixels of 5 Å"});
 }
 
 TEST(ImodProject, WhatStandsBehindACommandIsRefused) {

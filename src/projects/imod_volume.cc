@@ -127,7 +127,8 @@ void set_center(Project& project, CommandEntries& tilt, const ImodImages& images
 
 void set_imod_volume(Project& project, CommandEntries& tilt, const ImodImages& images) {
   constexpr std::array kNoShift{0.0};
-  if (const auto thickness = tilt.number("THICKNESS"))
+  // AreTomo writes 0 or -1 where it makes no volume.
+  if (const auto thickness = tilt.number("THICKNESS"); thickness && *thickness > 0)
     project.set("--thickness", text_of(*thickness / images.unit), tilt.file(), "THICKNESS");
   const auto shift = tilt.numbers("SHIFT", 1, 2, kNoShift).value_or(std::vector<double>{0});
   // Rows of IMOD's slices go down along Z (docs/geometry.md).

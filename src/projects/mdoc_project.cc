@@ -31,7 +31,7 @@ void set_target_defocus(Project& project, const fs::path& file, const io::Mdoc& 
         file.string(), lowest_um, highest_um));
     return;
   }
-  constexpr double kSpread_um = 1.0;
+  constexpr double kSpread_um = 0.2;  // less does not show in a tomogram
   if (highest_um - lowest_um > kSpread_um)
     project.warn(fmt::format(
         "'{}': TargetDefocus is from {} to {} µm, and its median is taken for all views (give "
@@ -46,7 +46,8 @@ void read_mdoc_project(Project& project) {
   const fs::path mdoc = project.request().path;
   const io::Mdoc contents = io::read_mdoc(mdoc);
   if (const auto stack = find_stack_beside(mdoc, contents.image_file)) {
-    project.set("stack", stack->string(), mdoc, "ImageFile");
+    const bool is_named = stack->filename() == contents.image_file;
+    project.set("stack", stack->string(), mdoc, is_named ? "ImageFile" : "its name");
   } else {
     io::open_mdoc_images(mdoc, mdoc.parent_path());  // throws Error if it cannot
     project.set("stack", mdoc.string(), mdoc, "SubFramePath");

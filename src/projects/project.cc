@@ -8,6 +8,7 @@
 
 #include "base/check.h"
 #include "io/saving/output_files.h"
+#include "io/tables/text_lines.h"
 #include "option_table/values.h"
 #include "tomofield/error.h"
 
@@ -24,6 +25,17 @@ struct MainFile {
   fs::path path;
 };
 
+// Tells whether a file has the word of its format. One that cannot be read may: the error says so
+// when it is read.
+bool has_word(const fs::path& path, std::string_view word) {
+  if (word.empty()) return true;
+  try {
+    return io::read_small_file(path).find(word) != std::string::npos;
+  } catch (const Error&) {
+    return true;
+  }
+}
+
 // Returns the main files of a folder of formats of a rank, sorted by name.
 std::vector<MainFile> main_files(const fs::path& folder, int rank) {
   std::vector<MainFile> found;
@@ -32,7 +44,7 @@ std::vector<MainFile> main_files(const fs::path& folder, int rank) {
     if (!entry.is_regular_file(absent)) continue;
     const std::string name = entry.path().filename().string();
     for (const Format& format : all_formats()) {
-      if (format.rank == rank && format.is_main_file(name))
+      if (format.rank == rank && format.is_main_file(name) && has_word(entry.path(), format.word))
         found.push_back({&format, entry.path()});
     }
   }
@@ -109,15 +121,29 @@ void require_no_series(const Request& request) {
                           request.series));
 }
 
+namespace {
+
+// Throws Error if entries are to be ignored of what has none, a stack or a folder of images.
+std::nullopt_t no_project(const Request& request) {
+  for (const std::string& entry : request.ignored)
+    if (!option_table::has_name({entry}, kTiltAxis))
+      throw Error(
+          fmt::format("--ignore {}: '{}' is no project, and has no such entry: leave it out", entry,
+                      request.path.string()));
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::optional<Project> read_project(const Request& request) {
   std::error_code absent;
   MainFile main{format_of(request.path), request.path};
   if (fs::is_directory(request.path, absent))
     main = find_main_file(request.path, request.has_mdoc);
   else if (!fs::exists(request.path, absent))
-    return std::nullopt;
+    return no_project(request);
   if (main.format == nullptr || !main.format->has_several) require_no_series(request);
-  if (main.format == nullptr) return std::nullopt;
+  if (main.format == nullptr) return no_project(request);
   Request of_file = request;
   of_file.path = main.path;
   Project project(of_file);

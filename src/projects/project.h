@@ -63,6 +63,8 @@ struct Format {
   std::string_view extension;  ///< of its main file, in lower case: ".aln"
   /// Returns true if a file of a folder is, by its name, the main file of a project.
   bool (*is_main_file)(std::string_view name);
+  /// A word that a main file has within its text; empty: its name is enough.
+  std::string_view word = {};
   /// Reads the main file `project.request().path` and what lies beside it, and sets options. Throws
   /// Error if they cannot be honoured.
   void (*read)(Project& project);

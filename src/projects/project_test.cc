@@ -42,6 +42,30 @@ TEST(ProjectFolder, HasOneProject) {
   EXPECT_FALSE(read_project({.path = imod.folder / "absent.com"}).has_value());
 }
 
+TEST(ProjectFolder, IsThatOfTheFileThatHoldsASeries) {
+  const ScratchDirectory folder;
+  write_stack(folder / "TS.mrc", 16, 12, 1, some_value);
+  folder.write("TS_1.eer.mdoc", "[FrameSet = 0]\nTiltAngle = 1\n");
+  const auto mdoc = folder.write("TS.mrc.mdoc", "[ZValue = 0]\nTiltAngle = 1\n");
+  EXPECT_EQ(read_project({.path = folder.path()})->files().front(), mdoc);
+  std::filesystem::remove(mdoc);
+  folder.write("m.xml", "<Movie/>");
+  const auto xml =
+      folder.write("TS.xml", "<TiltSeries><Angles>0</Angles><MoviePath>" +
+                                 (folder / "TS.mrc").string() + "</MoviePath></TiltSeries>");
+  EXPECT_EQ(read_project({.path = folder.path()})->files().front(), xml);
+}
+
+TEST(ProjectFolder, EntriesOfWhatHasNoneCannotBeIgnored) {
+  const ScratchDirectory folder;
+  const auto stack = write_stack(folder / "TS.mrc", 16, 12, 1, some_value);
+  const auto refusal = [&](const char* entry) {
+    return message_of<Error>([&] { read_project({.path = stack, .ignored = {entry}}); });
+  };
+  EXPECT_EQ(refusal("TiltAxisAngle"), "");
+  expect_parts(refusal("LOCALFILE"), {"--ignore LOCALFILE", "TS.mrc", "no project"});
+}
+
 TEST(ProjectFolder, OfImagesAlone) {
   const ScratchDirectory folder;
   EXPECT_FALSE(read_project({.path = folder.path(), .has_mdoc = true}));

@@ -9,6 +9,7 @@
 #include "io/tables/view_table.h"
 #include "projects/formats.h"
 #include "projects/stacks.h"
+#include "projects/transfer_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::projects {
@@ -49,7 +50,10 @@ bool set_views(Project& project, const fs::path& views, const fs::path& named_by
   for (const io::ImageInFile& image : io::find_view_images(table)) project.add_file(image.file);
   project.set("stack", views.string(), named_by, entry, row);
   const bool has_defocus = io::has_defocus(table);
-  if (has_defocus) project.set("--ctf", views.string(), views, "rlnDefocusU");
+  if (has_defocus)
+    project.set("--ctf", views.string(), views, "rlnDefocusU");
+  else
+    warn_of_unused_transfer(project, table);
   return has_defocus;
 }
 
@@ -76,15 +80,11 @@ void set_optics(Project& project, const io::RelionTomogram& tomogram, const fs::
 void set_detector(Project& project, const io::RelionTomogram& tomogram, const fs::path& star) {
   constexpr const char* kEntry = "rlnMtfFileName";
   if (tomogram.mtf.empty() || project.ignores(kEntry)) return;
-  const fs::path mtf = io::find_listed_file(tomogram.mtf, star);
-  std::error_code absent;
-  if (fs::is_regular_file(mtf, absent))
-    project.set("--mtf", mtf.string(), star, kEntry);
-  else
-    project.warn(
-        fmt::format("'{}', tomogram {}: _{} is '{}', which is not there, so it is not "
-                    "applied (--mtf)",
-                    star.string(), tomogram.name, kEntry, io::quote(tomogram.mtf)));
+  try {
+    project.set("--mtf", io::find_listed_file(tomogram.mtf, star).string(), star, kEntry);
+  } catch (const Error& absent) {
+    throw Error(fmt::format("{}, or go on without it with --ignore {}", absent.what(), kEntry));
+  }
 }
 
 // Warns if a tomogram's pixels are not those of its images.

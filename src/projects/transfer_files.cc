@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <map>
+#include <cmath>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -62,11 +63,15 @@ bool set_transfer_file(Project& project, const fs::path& file, const fs::path& n
   return !is_ignored;
 }
 
-// Returns the command files of IMOD's programs for the contrast transfer, which may not be there.
-std::array<fs::path, 2> ctf_commands_of(const fs::path& tilt_com) {
-  return {command_file_beside(tilt_com, "ctfcorrection"),
-          command_file_beside(tilt_com, "ctfplotter")};
-}
+// The command files of IMOD's programs for the contrast transfer, which may not be there.
+struct CtfCommands {
+  fs::path correction, plotter;
+
+  explicit CtfCommands(const fs::path& tilt_com)
+      : correction(command_file_beside(tilt_com, "ctfcorrection")),
+        plotter(command_file_beside(tilt_com, "ctfplotter")) {}
+  std::array<fs::path, 2> all() const { return {correction, plotter}; }
+};
 
 // Returns the entries of a command file, or none if it is not there.
 std::vector<io::CommandEntry> entries_of(const fs::path& file) {
@@ -77,76 +82,111 @@ std::vector<io::CommandEntry> entries_of(const fs::path& file) {
   return entries;
 }
 
-// Sets what the commands of some files say of the microscope.
-class OpticsOfCommands {
- public:
-  OpticsOfCommands(Project& project, const StackPixels& pixels, bool has_transfer)
-      : project_(project), pixels_(pixels), has_transfer_(has_transfer) {}
+// A number above 0 that an entry of a command file states.
+struct StatedNumber {
+  fs::path file;
+  std::string entry;
+  int line;
+  double value;
 
-  // Takes an entry. Returns whether it says something of the microscope.
-  bool take(const fs::path& file, const io::CommandEntry& entry) {
-    const std::string name = lower_case(entry.name);
-    warn_of_other_transfer(file, entry, name);
-    const auto optics = std::ranges::find(kOptics, name, &Optics::entry);
-    if (optics == kOptics.end() || project_.ignores(entry.name)) return false;
-    const std::string where = fmt::format("'{}', line {}", file.string(), entry.line);
+  static StatedNumber of(const fs::path& file, const io::CommandEntry& entry) {
     const auto number = io::parse_number(entry.value);
-    if (!number || *number <= 0)
-      throw Error(fmt::format("{}: '{} {}' is not a number above 0: correct it", where, entry.name,
-                              io::quote(entry.value)));
-    const auto [other, is_new] = values_.emplace(name, Value{*number, where});
-    if (is_new) set(*optics, file, entry.name, *number);
-    if (other->second.number != *number)
-      throw Error(
-          fmt::format("{}: {} is {}, and {} in {}: leave one out, or go on with --ignore {}", where,
-                      entry.name, *number, other->second.number, other->second.where, entry.name));
-    return true;
+    if (number && *number > 0) return {file, entry.name, entry.line, *number};
+    throw Error(fmt::format("'{}', line {}: '{} {}' is not a number above 0: correct it",
+                            file.string(), entry.line, entry.name, io::quote(entry.value)));
   }
 
- private:
+  // Throws Error if another entry contradicts this one.
+  [[noreturn]] void refuse_other(const StatedNumber& other) const {
+    throw Error(fmt::format(
+        "'{}', line {}: {} is {}, and {} is {} in '{}', line {}: leave one out, or go on with "
+        "--ignore {}",
+        file.string(), line, entry, value, other.entry, other.value, other.file.string(),
+        other.line, entry));
+  }
+};
+
+// Returns the number of an entry in a file, if it has it. Throws Error if it has two.
+std::optional<StatedNumber> find_stated(Project& project, const fs::path& file,
+                                        std::string_view name) {
+  std::optional<StatedNumber> found;
+  for (const io::CommandEntry& entry : entries_of(file)) {
+    if (lower_case(entry.name) != name || project.ignores(entry.name)) continue;
+    const StatedNumber stated = StatedNumber::of(file, entry);
+    if (found && found->value != stated.value) stated.refuse_other(*found);
+    found = stated;
+  }
+  return found;
+}
+
+// Sets what the commands say of the microscope.
+void set_microscope(Project& project, const CtfCommands& commands, bool has_transfer) {
   struct Optics {
     std::string_view entry, option;
     bool is_of_transfer;
   };
-  static constexpr std::array<Optics, 4> kOptics{
-      {{"voltage", "--voltage", false},
-       {"sphericalaberration", "--cs", true},
-       {"amplitudecontrast", "--amplitude-contrast", true},
-       {"pixelsize", "--pixel-size", false}}};
-  struct Value {
-    double number;
-    std::string where;
-  };
-
-  void set(const Optics& optics, const fs::path& file, const std::string& entry, double number) {
-    if (optics.option == "--pixel-size") {
-      const double size_A = kAngstroms_in_nm * number / pixels_.bin;
-      set_stated_pixel_size(project_, {file, entry, size_A}, pixels_.in_header_A);
-    } else if (has_transfer_ || !optics.is_of_transfer) {
-      project_.set(optics.option, fmt::format("{}", number), file, entry);
+  constexpr std::array<Optics, 3> kOptics{{{"voltage", "--voltage", false},
+                                           {"sphericalaberration", "--cs", true},
+                                           {"amplitudecontrast", "--amplitude-contrast", true}}};
+  for (const Optics& optics : kOptics) {
+    std::optional<StatedNumber> found;
+    for (const fs::path& file : commands.all()) {
+      const auto stated = find_stated(project, file, optics.entry);
+      if (!stated) continue;
+      if (found && found->value != stated->value) stated->refuse_other(*found);
+      if (!found && (has_transfer || !optics.is_of_transfer))
+        project.set(optics.option, fmt::format("{}", stated->value), file, stated->entry);
+      found = stated;
+      project.add_file(file);
     }
   }
+}
 
-  // The phase shifts that count are those of the .defocus file.
-  void warn_of_other_transfer(const fs::path& file, const io::CommandEntry& entry,
-                              const std::string& name) {
-    constexpr std::array<std::string_view, 4> kOthers{"degphaseshift", "phaseplateshift",
-                                                      "cutonfrequency", "inverttiltangles"};
-    if (!has_transfer_ || std::ranges::find(kOthers, name) == kOthers.end()) return;
+// Returns the size of unbinned pixels in nm: ctfplotter states that of the raw stack, ctfphaseflip
+// that of the aligned one, and beside it UnbinnedPixelSize. Before eTomo has updated the latter's
+// command file, it has the size of unbinned pixels, too.
+std::optional<StatedNumber> unbinned_pixel_nm(Project& project, const CtfCommands& commands,
+                                              double bin) {
+  constexpr double kRounding = 0.01;
+  const auto differ = [](double a, double b) { return std::fabs(a / b - 1.0) > kRounding; };
+  const auto of_raw = find_stated(project, commands.plotter, "pixelsize");
+  const auto stated = find_stated(project, commands.correction, "unbinnedpixelsize");
+  auto of_aligned = find_stated(project, commands.correction, "pixelsize");
+  if (of_raw && stated && differ(of_raw->value, stated->value)) of_raw->refuse_other(*stated);
+  const auto& unbinned = of_raw ? of_raw : stated;
+  if (unbinned && of_aligned && differ(of_aligned->value, unbinned->value * bin) &&
+      differ(of_aligned->value, unbinned->value))
+    of_aligned->refuse_other(*unbinned);
+  if (unbinned) return unbinned;
+  if (of_aligned) of_aligned->value /= bin;
+  return of_aligned;
+}
+
+void set_imod_pixel_size(Project& project, const CtfCommands& commands, const StackPixels& pixels) {
+  constexpr double kAngstroms_in_nm = 10.0;
+  const auto stated = unbinned_pixel_nm(project, commands, pixels.bin);
+  if (!stated) return;
+  const double of_stack = pixels.is_raw ? 1.0 : pixels.bin;
+  project.add_file(stated->file);
+  set_stated_pixel_size(project,
+                        {stated->file, stated->entry, kAngstroms_in_nm * stated->value * of_stack},
+                        pixels.in_header_A);
+}
+
+// Warns of what changes the contrast transfer and is not applied. The phase shifts that count are
+// those of the .defocus file.
+void warn_of_other_transfer(Project& project, const fs::path& file) {
+  constexpr std::array<std::string_view, 4> kOthers{"phaseshiftindegrees", "phaseplateshift",
+                                                    "cutonfrequency", "inverttiltangles"};
+  for (const io::CommandEntry& entry : entries_of(file)) {
+    if (std::ranges::find(kOthers, lower_case(entry.name)) == kOthers.end()) continue;
     const auto number = io::parse_number(entry.value);
-    if ((number && *number == 0.0) || project_.ignores(entry.name)) return;
-    project_.warn(
-        fmt::format("'{}', line {}: {} is not applied (--ignore {} says that this is "
-                    "meant)",
+    if ((number && *number == 0.0) || project.ignores(entry.name)) continue;
+    project.warn(
+        fmt::format("'{}', line {}: {} is not applied (--ignore {} says that this is meant)",
                     file.string(), entry.line, io::quote(entry.name), io::quote(entry.name)));
   }
-
-  static constexpr double kAngstroms_in_nm = 10.0;
-  Project& project_;
-  StackPixels pixels_;
-  bool has_transfer_;
-  std::map<std::string, Value> values_;  // by the entry
-};
+}
 
 }  // namespace
 
@@ -159,19 +199,23 @@ bool set_transfer_files(Project& project, const fs::path& folder, const std::str
   return false;
 }
 
+void warn_of_unused_transfer(Project& project, const io::ViewTable& table) {
+  for (const std::string& what : table.ctf_not_applied)
+    project.warn(fmt::format("'{}' has {}, so its contrast transfer is not applied",
+                             table.file.string(), what));
+}
+
 void set_imod_optics(Project& project, const fs::path& tilt_com, const StackPixels& pixels,
                      bool has_transfer) {
-  OpticsOfCommands optics(project, pixels, has_transfer);
-  for (const fs::path& file : ctf_commands_of(tilt_com)) {
-    bool is_used = false;
-    for (const io::CommandEntry& entry : entries_of(file))
-      is_used = optics.take(file, entry) || is_used;
-    if (is_used) project.add_file(file);
-  }
+  const CtfCommands commands(tilt_com);
+  set_microscope(project, commands, has_transfer);
+  set_imod_pixel_size(project, commands, pixels);
+  if (!has_transfer) return;
+  for (const fs::path& file : commands.all()) warn_of_other_transfer(project, file);
 }
 
 bool set_imod_transfer(Project& project, const fs::path& tilt_com, const std::string& name) {
-  for (const fs::path& com : ctf_commands_of(tilt_com)) {
+  for (const fs::path& com : CtfCommands(tilt_com).all()) {
     for (const io::CommandEntry& entry : entries_of(com)) {
       const fs::path file = com.parent_path() / entry.value;
       if (lower_case(entry.name) != "defocusfile" || !io::is_file(file)) continue;

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "io/tables/view_table.h"
 #include "projects/project.h"
 
 namespace tomofield::projects {
@@ -19,16 +20,20 @@ bool set_transfer_files(Project& project, const std::filesystem::path& folder,
 bool set_imod_transfer(Project& project, const std::filesystem::path& tilt_com,
                        const std::string& name);
 
-/// The pixel size in the header of the stack that is read, and how much larger those of the aligned
-/// stack are, which the command files describe.
+/// Warns that the contrast transfer of a table is not applied, and why, if it has a part of it.
+void warn_of_unused_transfer(Project& project, const io::ViewTable& table);
+
+/// The stack that is read: the pixel size in its header, and whether it is the raw one or the
+/// aligned one, whose pixels are larger by `bin`.
 struct StackPixels {
   double in_header_A = 0.0, bin = 1.0;
+  bool is_raw = true;
 };
 
-/// Sets --voltage, --cs and --amplitude-contrast from ctfplotter.com or ctfcorrection.com beside
-/// tilt.com (ctfplottera.com beside tilta.com). The last two describe a contrast transfer: they are
-/// set if there is one. Warns of entries that change it and are not applied. Throws Error for a
-/// value that is none, or that comes twice.
+/// Sets --voltage, --cs, --amplitude-contrast and --pixel-size from ctfplotter.com or
+/// ctfcorrection.com beside tilt.com (ctfplottera.com beside tilta.com). The second and the third
+/// describe a contrast transfer: they are set if there is one. Warns of entries that change it and
+/// are not applied. Throws Error for a value that is none, or that comes twice.
 void set_imod_optics(Project& project, const std::filesystem::path& tilt_com,
                      const StackPixels& pixels, bool has_transfer);
 

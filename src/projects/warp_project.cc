@@ -3,6 +3,7 @@
 #include "io/images/view_images.h"
 #include "io/tables/view_table.h"
 #include "projects/formats.h"
+#include "projects/transfer_files.h"
 
 namespace tomofield::projects {
 
@@ -19,9 +20,7 @@ void read_warp_project(Project& project) {
                   "AreAnglesInverted");
     }
   } else {
-    for (const std::string& what : table.ctf_not_applied)
-      project.warn(
-          fmt::format("'{}' has {}, so its contrast transfer is not applied", path.string(), what));
+    warn_of_unused_transfer(project, table);
   }
   if (!table.thickness_A) return;
   const double pixel_A = io::open_image_stack(path)->header().voxel_size_A[0];

@@ -47,7 +47,8 @@ std::vector<std::pair<const char*, std::filesystem::path>> small_files(const Ser
   add("fiducials", files.fiducials);
   if (measurement::has_ctf_file(files)) add("ctf", files.ctf);
   add("mtf", files.mtf);
-  if (!files.stack.empty() && io::is_view_table(files.stack)) add("stack", files.stack);
+  if (!files.stack.empty() && io::is_view_table(files.stack))
+    add("stack", io::without_half(files.stack));
   return all;
 }
 

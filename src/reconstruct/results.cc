@@ -16,6 +16,7 @@
 #include "base/progress.h"
 #include "base/range.h"
 #include "base/threads/parallel.h"
+#include "base/threads/stoppable_loops.h"
 #include "base/trace.h"
 #include "checkpoint/checkpoint.h"
 #include "compact/budget.h"
@@ -148,9 +149,12 @@ void write_results(RunResult& results, const ResultFiles& files) {
                          model.string()));
 }
 
-// Replaces the model of the results by a compact one.
-void make_compact(const compact::Budget& budget, RunResult& results) {
+// Replaces the model of the results by a compact one. Throws base::StopRequested if a stop is asked
+// for.
+void make_compact(const compact::Budget& budget, const std::function<bool()>& is_asked,
+                  RunResult& results) {
   const base::Stopwatch running;
+  const base::StoppableLoops loops(is_asked);
   const output::Model& model = *results.model;
   compact::CompactField made = compact::compress(
       *model.field, model.roi, budget,
@@ -160,13 +164,16 @@ void make_compact(const compact::Budget& budget, RunResult& results) {
   results.record.compact = record::CompactRecord{made.report, running.seconds()};
 }
 
-// Does the same. If that fails, keeps the finished fit.
+// Does the same. If that fails or is stopped, keeps the finished fit.
 void make_compact_or_keep(const ResultFiles& files, std::optional<io::OutputSet>& outputs,
                           RunResult& results) {
   const std::filesystem::path& model = files.run.paths.model;
+  // Several processes cannot leave a loop together.
+  const auto is_asked = files.share.processes.size() == 1 ? files.run.observer.stop_requested
+                                                          : std::function<bool()>();
   try {
-    make_compact(compact::parse_budget(files.run.options.field.budget), results);
-  } catch (const Error&) {
+    make_compact(compact::parse_budget(files.run.options.field.budget), is_asked, results);
+  } catch (...) {
     if (!outputs) throw;
     keep_model(model, *outputs, [&] { output::save_model(model, *results.model, &files.state); });
   }
@@ -237,7 +244,11 @@ RunResult finish(fit::Fit& fit, const Run& run, const FitOutcome& outcome) {
   RunResult result{.model = output::Model{info, fit.take_field(), std::nullopt},
                    .record = run_record(run.options, std::move(found))};
   const ResultFiles files{run, origin, state, share, view};
-  if (!run.options.field.budget.empty()) make_compact_or_keep(files, outputs, result);
+  try {
+    if (!run.options.field.budget.empty()) make_compact_or_keep(files, outputs, result);
+  } catch (const base::StopRequested&) {
+    return {.outcome = Outcome::kStopped, .checkpoint = run.paths.model};
+  }
   if (run.writes_files()) write_together(files, *outputs, result);
   return result;
 }

@@ -9,6 +9,7 @@
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tilt_series/tilt_series.h"
+#include "warning_catcher.h"
 
 namespace tomofield::tilt_series {
 namespace {
@@ -20,6 +21,7 @@ using testing::refusal;
 using testing::ScratchDirectory;
 using testing::small_series;
 using testing::some_value;
+using testing::WarningCatcher;
 using testing::write_stack;
 
 struct AlignmentCase {
@@ -143,6 +145,19 @@ TEST(TiltSeriesTransforms, DarkFramesOfAreTomoAreLeftOut) {
   EXPECT_EQ(series.views()[1].tilt_deg, 0.0);
   options.aln = scratch.write("a.aln", "# RawSize = 32 24 4\n0 0 1 0 0 0 0 0 0 -20\n");
   expect_parts(refusal(options), {"32 × 24", "16 × 12"});
+}
+
+TEST(TiltSeriesTransforms, AViewThatIsTurnedAgainstTheOthersIsSaid) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 4);
+  const auto warnings = [&](const std::string& last) {
+    options.xf = scratch.write("a.xf", "1 0 0 1 0 0\n1 0 0 1 0 0\n1 0 0 1 0 0\n" + last + "\n");
+    const WarningCatcher caught;
+    const TiltSeries series(options);
+    return caught.text();
+  };
+  EXPECT_EQ(warnings("0.97 0.24 -0.24 0.97 0 0"), "");
+  expect_parts(warnings("0 1 -1 0 0 0"), {"a.xf", "1 of 4 views", "section 4", "90.0°"});
 }
 
 }  // namespace

@@ -26,6 +26,10 @@ Angles values_of(const TiltAngles& angles) {
   return values;
 }
 
+std::string name_of_alignment(const TiltSeriesOptions& options, const io::ImageStack& stack) {
+  return options.xf ? options.xf->string() : options.aln ? options.aln->string() : stack.name();
+}
+
 // Returns the offset that most of the differences share, or 0.
 double common_offset(const std::vector<double>& differences) {
   const double median = base::median(differences);
@@ -35,10 +39,13 @@ double common_offset(const std::vector<double>& differences) {
   return 2 * num_near > std::ssize(differences) ? median : 0.0;
 }
 
-}  // namespace
+// The sections in which angles differ from others by more than a common offset.
+struct OtherAngles {
+  std::size_t count = 0, first = 0;  // first: of them
+  std::size_t of = 0;                // sections that have both
+};
 
-void warn_of_other_angles(const Angles& angles, const std::string& source, const Angles& others,
-                          const std::string& other_source) {
+OtherAngles find_other_angles(const Angles& angles, const Angles& others) {
   std::vector<double> differences;
   std::vector<std::size_t> sections;
   for (std::size_t i = 0; i < angles.size(); ++i) {
@@ -46,18 +53,31 @@ void warn_of_other_angles(const Angles& angles, const std::string& source, const
     differences.push_back(*angles[i] - *others[i]);
     sections.push_back(i);
   }
-  if (differences.empty()) return;
+  if (differences.empty()) return {};
   const double offset = common_offset(differences);
-  std::size_t count = 0, first = 0;
+  OtherAngles found{.of = differences.size()};
   for (std::size_t i = 0; i < differences.size(); ++i) {
     if (std::fabs(differences[i] - offset) <= kLargestChange_deg) continue;
-    if (count++ == 0) first = sections[i];
+    if (found.count++ == 0) found.first = sections[i];
   }
-  if (count == 0) return;
+  return found;
+}
+
+}  // namespace
+
+bool are_other_angles(const Angles& angles, const Angles& others) {
+  return find_other_angles(angles, others).count > 0;
+}
+
+void warn_of_other_angles(const Angles& angles, const std::string& source, const Angles& others,
+                          const std::string& other_source) {
+  const OtherAngles found = find_other_angles(angles, others);
+  if (found.count == 0) return;
   base::log_warning(fmt::format(
       "the tilt angles of '{}' differ from those of {} in {} of {} sections by more than a common "
       "offset (section {}: {:g}° and {:g}°): are they in the order of the sections?",
-      source, other_source, count, differences.size(), first + 1, *angles[first], *others[first]));
+      source, other_source, found.count, found.of, found.first + 1, *angles[found.first],
+      *others[found.first]));
 }
 
 void warn_of_other_angles(const TiltAngles& used, const std::filesystem::path& path,
@@ -95,6 +115,15 @@ void warn_of_other_angles(const TiltAngles& used, const SectionTable& table) {
     warn_of_other_angles(values_of(used), used.source, others, fmt::format("'{}'", table.source));
 }
 
+void warn_of_other_nominal_angles(const SectionTable& table) {
+  Angles angles;
+  for (const auto& section : table.of_section)
+    angles.push_back(section ? std::optional(section->tilt_deg) : std::nullopt);
+  if (table.nominal_tilt_deg.size() == angles.size())
+    warn_of_other_angles(angles, table.source, table.nominal_tilt_deg,
+                         "its _rlnTomoNominalStageTiltAngle");
+}
+
 void warn_of_two_axes(const StatedAxis& used, const std::optional<StatedAxis>& other) {
   if (!other || used.is_given ||
       angle_between_axes(used.angle_deg, other->angle_deg) <= kLargestAxisChange_deg)
@@ -109,13 +138,33 @@ void warn_of_other_axis(const StatedAxis& stated, double aligned_axis_deg,
                         const TiltSeriesOptions& options, const io::ImageStack& stack) {
   const double difference_deg = angle_between_axes(stated.angle_deg, aligned_axis_deg);
   if (stated.is_given || difference_deg <= kLargestAxisChange_deg) return;
-  const std::string alignment = options.xf    ? options.xf->string()
-                                : options.aln ? options.aln->string()
-                                              : stack.name();
-  base::log_warning(
-      fmt::format("'{}' turns the views by a tilt axis of {:.1f}°, and {} states {:.1f}°: are they "
-                  "of one series?",
-                  alignment, aligned_axis_deg, stated.source, stated.angle_deg));
+  const bool is_opposite = difference_deg >= 180.0 - kLargestAxisChange_deg;
+  base::log_warning(fmt::format(
+      "'{}' turns the views by a tilt axis of {:.1f}°, and {} states {:.1f}°: {}",
+      name_of_alignment(options, stack), aligned_axis_deg, stated.source, stated.angle_deg,
+      is_opposite ? "one of the two makes a tomogram that is mirrored in z"
+                  : "are they of one series?"));
+}
+
+void warn_of_turned_views(const Angles& axes_deg, double mean_deg, const TiltSeriesOptions& options,
+                          const io::ImageStack& stack) {
+  constexpr double kLargestTurn_deg = 20.0;
+  std::size_t count = 0, most = 0;
+  double largest_deg = 0.0;
+  for (std::size_t i = 0; i < axes_deg.size(); ++i) {
+    const double turn_deg =
+        axes_deg[i] ? std::fabs(std::remainder(*axes_deg[i] - mean_deg, 360.0)) : 0.0;
+    if (turn_deg > kLargestTurn_deg) ++count;
+    if (turn_deg <= largest_deg) continue;
+    largest_deg = turn_deg;
+    most = i;
+  }
+  if (count == 0) return;
+  base::log_warning(fmt::format(
+      "'{}' turns {} of {} views by another tilt axis than the rest (section {}: {:.1f}°, the mean "
+      "is {:.1f}°): is it damaged?",
+      name_of_alignment(options, stack), count, axes_deg.size(), most + 1, *axes_deg[most],
+      mean_deg));
 }
 
 void warn_of_given_axis(double given_deg, const std::optional<StatedAxis>& stated) {

@@ -83,6 +83,22 @@ AlignedSection section_of(const io::ListedView& view, io::CentreRule centre,
   return {view.tilt_deg, view.x_tilt_deg, view.rotation_deg, map, 0};
 }
 
+// The averages of a movie may be binned, and are then about as large in Å.
+void warn_of_other_size(const io::ViewTable& table, const io::ImageStack& stack,
+                        double pixel_size_A) {
+  constexpr double kRounding = 0.05;
+  if (!table.image_size_A || pixel_size_A <= 0.0) return;
+  const std::array<double, 2> size_A{static_cast<double>(stack.header().nx) * pixel_size_A,
+                                     static_cast<double>(stack.header().ny) * pixel_size_A};
+  const auto is_near = [](double a, double b) { return std::fabs(a / b - 1.0) <= kRounding; };
+  const auto [width_A, height_A] = *table.image_size_A;
+  if (is_near(size_A[0], width_A) && is_near(size_A[1], height_A)) return;
+  base::log_warning(fmt::format(
+      "'{}' states images of {:.0f} × {:.0f} Å, and its images have {:.0f} × {:.0f} Å: are they of "
+      "one series, and is the pixel size right (--pixel-size)?",
+      table.file.string(), width_A, height_A, size_A[0], size_A[1]));
+}
+
 }  // namespace
 
 SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::ImageStack& stack,
@@ -116,9 +132,11 @@ SectionTable sections_of_views(const io::ViewTable& table, const io::ImageStack&
       .source = table.file.string(), .of_section = {}, .is_nominal = table.is_nominal};
   for (const io::ListedView& view : table.views) {
     sections.of_section.emplace_back();
+    sections.nominal_tilt_deg.push_back(view.nominal_tilt_deg);
     if (view.is_used)
       sections.of_section.back() = section_of(view, table.centre, stack.header(), pixel_size_A);
   }
+  warn_of_other_size(table, stack, pixel_size_A);
   for (const std::string& what : table.not_applied)
     base::log_warning(fmt::format("'{}' has {}, which is not applied", table.file.string(), what));
   for (const std::string& remark : table.remarks)

@@ -13,6 +13,8 @@
 
 namespace tomofield::tilt_series {
 
+using Angles = std::vector<std::optional<double>>;  ///< [section]; none: not stated
+
 /// The alignment of one section of a stack.
 struct AlignedSection {
   double tilt_deg = 0.0;
@@ -29,6 +31,7 @@ struct SectionTable {
   std::vector<std::optional<AlignedSection>> of_section;  ///< none: left out by that program
   /// [section]: what AreTomo moves by itself; empty without a local alignment.
   std::vector<std::vector<io::AreTomoPatch>> patches = {};
+  Angles nominal_tilt_deg = {};  ///< those of the microscope, beside refined ones; else empty
   bool is_nominal = false;  ///< the angles are those of the microscope, and nothing is aligned yet
 };
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "scratch_directory.h"
+#include "tilt_series/contradictions.h"
 #include "warning_catcher.h"
 
 namespace tomofield::tilt_series {
@@ -101,6 +102,37 @@ TEST(SectionTable, SaysThatAreTomoAlignedAStackOfOtherSections) {
   EXPECT_EQ(warnings_with(3, "# DarkFrame = 2 3 20\n"), "");  // the stack is without it
   const std::string said = warnings_with(41, "");
   for (const char* part : {"a.aln", "41 sections", "RawSize", "2 rows"})
+    EXPECT_NE(said.find(part), std::string::npos) << part << " in " << said;
+}
+
+TEST(SectionTable, SaysThatATableStatesImagesOfAnotherSize) {
+  const SizedStack stack(64, 48, 1);
+  const auto warnings_with = [&](double width_A, double height_A) {
+    io::ViewTable table{"a.xml", io::CentreRule::kHalfSize, false, {some_view()}, {}, {}};
+    table.image_size_A = {width_A, height_A};
+    const testing::WarningCatcher warnings;
+    sections_of_views(table, stack, kPixel_A);
+    return warnings.text();
+  };
+  EXPECT_EQ(warnings_with(161, 119), "");
+  const std::string said = warnings_with(320, 240);
+  for (const char* part : {"a.xml", "320 × 240 Å", "160 × 120 Å", "--pixel-size"})
+    EXPECT_NE(said.find(part), std::string::npos) << part << " in " << said;
+}
+
+TEST(SectionTable, SaysThatAnglesDifferFromTheNominalOnesOfTheTable) {
+  const auto warnings_with = [](double last_deg) {
+    SectionTable table{"a.star", {}};
+    for (const double tilt_deg : {-20.0, 0.0, last_deg})
+      table.of_section.push_back(AlignedSection{.tilt_deg = tilt_deg, .raw_from_aligned = {}});
+    table.nominal_tilt_deg = {-18.0, 2.0, 22.0};
+    const testing::WarningCatcher warnings;
+    warn_of_other_nominal_angles(table);
+    return warnings.text();
+  };
+  EXPECT_EQ(warnings_with(21.0), "");
+  const std::string said = warnings_with(-60.0);
+  for (const char* part : {"a.star", "rlnTomoNominalStageTiltAngle", "1 of 3", "-60"})
     EXPECT_NE(said.find(part), std::string::npos) << part << " in " << said;
 }
 

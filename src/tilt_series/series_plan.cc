@@ -27,12 +27,27 @@
 namespace tomofield::tilt_series {
 namespace {
 
+constexpr double kDegree_rad = std::numbers::pi / 180.0;
+
 /// The in-plane transform of each section, and the rotation of the tilt axis that it undoes.
 struct InPlaneAlignment {
   std::vector<std::optional<RawFromAligned>> of_section;  ///< none: not aligned (dark frame)
-  double sum_cos = 0.0, sum_sin = 0.0;                    ///< over the sections, of the rotation
+  Angles axes_deg;                                        ///< [section]; none: it has no rotation
+  double sum_cos = 0.0, sum_sin = 0.0;                    ///< of the axes
 
-  double axis_deg() const { return std::atan2(sum_sin, sum_cos) * 180.0 / std::numbers::pi; }
+  void add_section(const RawFromAligned& transform, std::optional<double> axis_deg) {
+    of_section.emplace_back(transform);
+    axes_deg.push_back(axis_deg);
+    if (!axis_deg) return;
+    sum_cos += std::cos(*axis_deg * kDegree_rad);
+    sum_sin += std::sin(*axis_deg * kDegree_rad);
+  }
+  void add_dark_frame() {
+    of_section.emplace_back();
+    axes_deg.emplace_back();
+  }
+
+  double axis_deg() const { return std::atan2(sum_sin, sum_cos) / kDegree_rad; }
   /// Tells whether the aligned images are as wide as the raw ones are high.
   bool swaps_sizes() const { return std::fabs(sum_sin) > std::fabs(sum_cos); }
 };
@@ -42,13 +57,12 @@ InPlaneAlignment alignment_of_imod(const std::filesystem::path& path, const io::
   require_count(transforms.size(), path, "transforms", stack);
   InPlaneAlignment alignment;
   for (const io::ImodTransform& t : transforms) {
-    alignment.of_section.emplace_back(geometry::invert(t));
     // A pure rotation is R(−ROT): cos on the diagonal, +sin ROT above it.
     const double cosine = t.a11 + t.a22, sine = t.a12 - t.a21;
-    const double length = std::hypot(cosine, sine);
-    if (length == 0.0) continue;
-    alignment.sum_cos += cosine / length;
-    alignment.sum_sin += sine / length;
+    const bool is_turned = std::hypot(cosine, sine) > 0.0;
+    alignment.add_section(
+        geometry::invert(t),
+        is_turned ? std::optional(std::atan2(sine, cosine) / kDegree_rad) : std::nullopt);
   }
   return alignment;
 }
@@ -56,25 +70,21 @@ InPlaneAlignment alignment_of_imod(const std::filesystem::path& path, const io::
 InPlaneAlignment alignment_of_table(const SectionTable& table) {
   InPlaneAlignment alignment;
   for (const auto& section : table.of_section) {
-    alignment.of_section.emplace_back();
-    if (!section) continue;
-    alignment.of_section.back() = section->raw_from_aligned;
-    const double rotation_rad = section->rotation_deg * std::numbers::pi / 180.0;
-    alignment.sum_cos += std::cos(rotation_rad);
-    alignment.sum_sin += std::sin(rotation_rad);
+    if (section)
+      alignment.add_section(section->raw_from_aligned, section->rotation_deg);
+    else
+      alignment.add_dark_frame();
   }
   return alignment;
 }
 
 /// Returns the alignment of views that are turned by their tilt axis and not shifted.
 InPlaneAlignment alignment_of_axis(double axis_deg, const io::ImageStack& stack) {
-  const double axis_rad = axis_deg * std::numbers::pi / 180.0;
+  const double cosine = std::cos(axis_deg * kDegree_rad), sine = std::sin(axis_deg * kDegree_rad);
+  const RawFromAligned turned{cosine, -sine, sine, cosine};
   InPlaneAlignment alignment;
-  alignment.sum_cos = std::cos(axis_rad);
-  alignment.sum_sin = std::sin(axis_rad);
-  const RawFromAligned turned{alignment.sum_cos, -alignment.sum_sin, alignment.sum_sin,
-                              alignment.sum_cos};
-  alignment.of_section.assign(static_cast<std::size_t>(stack.header().nz), turned);
+  for (std::int64_t section = 0; section < stack.header().nz; ++section)
+    alignment.add_section(turned, axis_deg);
   return alignment;
 }
 
@@ -268,12 +278,15 @@ std::vector<double> find_x_tilts(const TiltSeriesOptions& options, const io::Ima
   }
   constexpr double kLargest_deg = 80.0;
   for (std::size_t i = 0; i < x_tilts_deg.size(); ++i) {
-    if (std::fabs(x_tilts_deg[i]) <= kLargest_deg) continue;
-    throw Error(
-        fmt::format("section {} of '{}' has an x-axis tilt of {}°, and they must be within "
-                    "±{}°: mend it in '{}'",
-                    i + 1, stack.name(), x_tilts_deg[i], kLargest_deg,
-                    options.xtilt ? options.xtilt->string() : stack.name()));
+    const double all_deg = x_tilts_deg[i] - options.x_axis_tilt_deg;
+    if (std::max(std::fabs(x_tilts_deg[i]), std::fabs(all_deg)) <= kLargest_deg) continue;
+    throw Error(fmt::format(
+        "section {} of '{}' has an x-axis tilt of {}°{}, and they must be within ±{}°: mend it in "
+        "'{}'{}",
+        i + 1, stack.name(), x_tilts_deg[i],
+        options.x_axis_tilt_deg != 0.0 ? fmt::format(", {}° with --x-axis-tilt", all_deg) : "",
+        kLargest_deg, options.xtilt ? options.xtilt->string() : stack.name(),
+        options.x_axis_tilt_deg != 0.0 ? ", or --x-axis-tilt" : ""));
   }
   return x_tilts_deg;
 }
@@ -357,6 +370,11 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
     throw Error(fmt::format(
         "'{}' is a volume that tomofield wrote, and no tilt series: give the stack", stack.name()));
   }
+  if (header.sections_a_volume > 0) {
+    throw Error(fmt::format(
+        "'{}' is a stack of volumes (space group 401), and no tilt series: give the stack",
+        stack.name()));
+  }
   const auto mdoc = options.mdoc ? std::optional(io::read_mdoc(*options.mdoc)) : std::nullopt;
   SeriesPlan plan;
   plan.pixel_size_A = find_pixel_size(options, stack, mdoc);
@@ -374,8 +392,10 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
     if (mdoc) warn_of_other_angles(angles, *options.mdoc, *mdoc, stack);
     warn_of_other_angles(angles, stack);
     if (table) warn_of_other_angles(angles, *table);
+    if (table) warn_of_other_nominal_angles(*table);
     if (axis && mdoc) warn_of_two_axes(*axis, axis_of_header(stack));
     if (axis && alignment) warn_of_other_axis(*axis, alignment->axis_deg(), options, stack);
+    if (alignment) warn_of_turned_views(alignment->axes_deg, alignment->axis_deg(), options, stack);
     if (options.tilt_axis_deg)
       warn_of_given_axis(*options.tilt_axis_deg, axis_of_files(options, stack, table, mdoc));
     if (options.starts_raw && !axis && !alignment) warn_of_unknown_axis(stack);

@@ -43,6 +43,13 @@ std::optional<StatedAxis> axis_of_mdoc(const std::filesystem::path& path, const 
   if (mdoc.tilt_axis_deg) return StatedAxis{mdoc.tilt_axis_deg->value, line(*mdoc.tilt_axis_deg)};
   if (!mdoc.unclear_axis_deg || is_aligned) return std::nullopt;
   const double stated_deg = mdoc.unclear_axis_deg->value;
+  if (mdoc.has_rotation_alone) {
+    throw Error(fmt::format(
+        "{}: RotationAngle = {}° is stated without a tilt axis, which is {:.4g}° by the rule of "
+        "SerialEM: give it with --tilt-axis, or --ignore TiltAxisAngle if the views are aligned "
+        "already",
+        line(*mdoc.unclear_axis_deg), stated_deg, std::remainder(stated_deg - 90.0, 360.0)));
+  }
   throw Error(fmt::format(
       "{}: Tomography states TiltAxisAngle = {}°, which alone does not tell the tilt axis: it is "
       "{:.4g}° in most files. Give it with --tilt-axis, or --ignore TiltAxisAngle if the views are "
@@ -53,7 +60,7 @@ std::optional<StatedAxis> axis_of_mdoc(const std::filesystem::path& path, const 
 }  // namespace
 
 double angle_between_axes(double a_deg, double b_deg) {
-  return std::fabs(std::remainder(a_deg - b_deg, 180.0));
+  return std::fabs(std::remainder(a_deg - b_deg, 360.0));
 }
 
 std::optional<StatedAxis> axis_of_header(const io::ImageStack& stack) {
@@ -72,7 +79,11 @@ std::optional<StatedAxis> find_stated_axis(const TiltSeriesOptions& options,
   if (option_table::has_name(option_table::split_names(options.ignore), kIgnoredEntry))
     return std::nullopt;
   std::optional<StatedAxis> axis;
-  if (mdoc) axis = axis_of_mdoc(*options.mdoc, *mdoc, is_aligned);
+  const bool has_rotation_alone = mdoc && mdoc->has_rotation_alone;
+  if (has_rotation_alone) axis = axis_of_header(stack);
+  if (mdoc && !axis)
+    axis = axis_of_mdoc(*options.mdoc, *mdoc,
+                        is_aligned || (has_rotation_alone && is_transformed(stack.header())));
   if (!axis) axis = axis_of_header(stack);
   if (axis) axis->angle_deg = std::remainder(axis->angle_deg, 360.0);
   return axis;

@@ -22,7 +22,8 @@ std::optional<StatedAxis> find_stated_axis(const TiltSeriesOptions& options,
                                            const io::ImageStack& stack,
                                            const std::optional<io::Mdoc>& mdoc, bool is_aligned);
 
-/// Returns by how much two directions of an axis differ, in degrees from 0 to 90.
+/// Returns by how much two directions of an axis differ, in degrees from 0 to 180. Opposite ones
+/// are of volumes that are mirrored in z.
 double angle_between_axes(double a_deg, double b_deg);
 
 /// Throws Error for a stack that is taken for an aligned one although its axis is not vertical.

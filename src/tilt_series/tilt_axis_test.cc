@@ -102,6 +102,29 @@ TEST(TiltAxis, OfAnMdocComesBeforeThatOfTheHeader) {
   EXPECT_EQ(refusal(options), "");  // the axis is not needed
 }
 
+TEST(TiltAxis, OfRotationAngleAloneIsNotGuessed) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  options.mdoc = scratch.write(
+      "a.mdoc",
+      "[FrameSet = 0]\nRotationAngle = 178.4\n[ZValue = 0]\nTiltAngle = -20\n[ZValue = 1]\n"
+      "TiltAngle = -10\n[ZValue = 2]\nTiltAngle = 0\n");
+  expect_parts(refusal(options),
+               {"a.mdoc", "line 2", "RotationAngle = 178.4", "88.4", "--tilt-axis"});
+  options.ignore = "TiltAxisAngle";
+  EXPECT_EQ(refusal(options), "");
+  options.ignore = "";
+  write_labels(options, {"Tilt axis angle = 0.4, binning = 1"});
+  EXPECT_EQ(refusal(options), "");
+}
+
+TEST(TiltAxis, OfTheOppositeDirectionIsNoVerticalOne) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  write_labels(options, {"Tilt axis angle = 180.0, binning = 1"});
+  expect_parts(refusal(options), {"180", "from the vertical", "--align full"});
+}
+
 TEST(TiltAxis, ThatNoFileStatesIsSaidBeforeAnAlignment) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = small_series(scratch);
@@ -128,7 +151,7 @@ TEST(TiltAxis, OfAnAlignmentThatDiffersIsSaid) {
   const std::string row = fmt::format("{0} {1} -{1} {0} 0 0\n", c, s);
   options.xf = scratch.write("a.xf", row + row + row);
   EXPECT_EQ(warning_with(86.2), "");
-  EXPECT_EQ(warning_with(-97), "");  // modulo 180°
+  expect_parts(warning_with(-97), {"a.xf", "85.0°", "-97.0°", "mirrored in z"});
   expect_parts(warning_with(5), {"a.xf", "85.0°", "a.mdoc", "5.0°"});
 }
 

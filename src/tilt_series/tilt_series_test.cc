@@ -219,8 +219,8 @@ TEST(TiltSeries, ARawStackMustBeAlignedIfTheMdocSaysSo) {
   expect_parts(with_axis("85.9"),
                {"a.mdoc", "line 1", "85.9", "a.st", "--xf", "--aln", "--ignore"});
   expect_parts(with_axis("-1.5"), {"-1.5"});
-  for (const char* vertical : {"0.9", "-0.4", "180.5", "-179.2"})
-    EXPECT_EQ(with_axis(vertical), "");
+  expect_parts(with_axis("-179.2"), {"-179.2"});  // the tilts go the other way
+  for (const char* vertical : {"0.9", "-0.4", "359.5"}) EXPECT_EQ(with_axis(vertical), "");
   options.ignore = "LOG, tiltaxisangle";
   EXPECT_EQ(with_axis("85.9"), "");
   options.ignore = "";
@@ -269,6 +269,19 @@ TEST(TiltSeries, OtherFilesOfASeriesAreNamed) {
     options.stack = scratch.write(name, "1 2 3\n");
     expect_parts(refusal(options), {name});
   }
+}
+
+TEST(TiltSeries, AStackOfVolumesIsNone) {
+  const ScratchDirectory scratch;
+  io::MrcSpec spec;
+  spec.nx = spec.ny = spec.sections_a_volume = 8;
+  spec.nz = 24;
+  TiltSeriesOptions options = small_series(scratch);
+  options.stack = scratch / "particles.mrc";
+  io::MrcWriter writer(options.stack, spec);
+  for (int z = 0; z < spec.nz; ++z) writer.write_section(z, std::vector<float>(64, 1.0f));
+  writer.close();
+  expect_parts(refusal(options), {"particles.mrc", "stack of volumes", "401"});
 }
 
 TEST(TiltSeries, FewPixelsThatAreNoNumbersAreMasked) {

@@ -512,6 +512,8 @@ def test_x_axis_tilts_and_bins_that_make_no_sense(refuse_series, stack, text_fil
     for tilt in ("91", "-80.5"):
         file = text_file("steep.xtilt", "0\n" * 3 + tilt + "\n" + "0\n" * (NUM_VIEWS - 4))
         refuse_series([file, "section 4", "80"], stack, "--xtilt", file)
+    file = text_file("half_steep.xtilt", "50\n" * NUM_VIEWS)
+    refuse_series([file, "100", "--x-axis-tilt"], stack, "--xtilt", file, "--x-axis-tilt", -50)
     for number in (3, 6, 12):
         refuse_series(["--coarse-bin", "power of two"], stack, "--coarse-bin", number)
 

@@ -478,6 +478,71 @@ def test_a_tomogram_does_not_take_the_place_of_the_table_for_relion():
     assert "tomograms.star" in said.stderr and not os.path.exists(results)
 
 
+@pytest.mark.parametrize("name", ["index.html", "summary.csv", "batch.json", "choice.json", "logs/a.log"])
+def test_files_of_others_that_are_called_like_its_own_stay(data, name):
+    results = pathlib.Path(harness.fresh_directory("of_others"))
+    (results / "logs").mkdir()
+    (results / name).write_text("precious", encoding="utf-8")
+    for more in ([], ["--overwrite"], ["--dry-run"]):
+        said = harness.tomofield("batch", os.path.join(data, "a.mrc"), *pattern(data)[1:], *QUICK, *more,
+                                 "-o", results)
+        assert said.returncode == 2 and name in said.stderr and "earlier batch" in said.stderr, said.stderr
+    assert (results / name).read_text(encoding="utf-8") == "precious"
+
+
+def fake_sbatch(folder, answer):
+    """Returns the environment with an sbatch that answers this."""
+    program = pathlib.Path(folder) / "sbatch"
+    program.write_text(f"#!/bin/sh\nprintf '{answer}'\n", encoding="utf-8")
+    program.chmod(0o755)
+    return {**os.environ, "PATH": f"{folder}:/usr/bin:/bin"}
+
+
+def test_what_slurm_cannot_take_leaves_the_earlier_batch_as_it_is(data):
+    folder = pathlib.Path(harness.fresh_directory("refused"))
+    results, programs, spaced = folder / "results", folder / "programs", folder / "a b"
+    programs.mkdir()
+    spaced.mkdir()
+    command = ["batch", os.path.join(data, "a.mrc"), *pattern(data)[1:], *QUICK, "-o", results]
+    harness.succeed(*command)
+    files = {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
+    with_sbatch = fake_sbatch(programs, "55\\n")
+    for environment, where, part in ((with_sbatch, spaced, "start the command in a folder"),
+                                     ({**os.environ, "PATH": "/nowhere"}, folder, "sbatch is not there")):
+        said = harness.tomofield(*command, "--overwrite", "--slurm", cwd=where, env=environment)
+        assert said.returncode == 2 and part in said.stderr, said.stderr
+    tilts = folder / os.fsdecode(b"t\xff")
+    tilts.mkdir()
+    shutil.copy(os.path.join(data, "a.tlt"), tilts)
+    for more in (["--dry-run"], []):
+        said = harness.tomofield(*command[:2], "--tlt", tilts / "{name}.tlt", *command[4:], "--overwrite", *more)
+        assert said.returncode == 2 and "not UTF-8" in said.stderr, said.stderr
+    assert files == {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("answer, number", [("note\\n55;cluster\\nsbatch: more\\n", "55"), ("queued\\n", None)])
+def test_the_answer_of_sbatch_is_a_number(data, answer, number):
+    folder = harness.fresh_directory("answer")
+    said = harness.tomofield("batch", os.path.join(data, "a.mrc"), *pattern(data)[1:], *QUICK, "--slurm",
+                             "-o", os.path.join(folder, "results"), env=fake_sbatch(folder, answer))
+    if number:
+        assert said.returncode == 0 and f"Slurm job {number}" in said.stdout, said
+    else:
+        assert said.returncode == 2 and "'queued'" in said.stderr, said.stderr
+
+
+def test_a_tomogram_may_be_called_like_a_placeholder():
+    folder = harness.fresh_directory("braces")
+    star = star_projects.write_relion(folder, harness.Series("source"))
+    text = pathlib.Path(star).read_text(encoding="utf-8")
+    pathlib.Path(star).write_text(text.replace("TS_01 ", "{name} ", 1), encoding="utf-8")
+    results = os.path.join(folder, "results")
+    harness.succeed("batch", star, *QUICK[2:], "-o", results, cwd=folder)
+    with open(os.path.join(results, "batch.json"), encoding="utf-8") as file:
+        jobs = json.load(file)["jobs"]
+    assert any("--series={name}" in job["command"] for job in jobs), jobs
+
+
 def test_dry_run_tells_what_is_needed_and_makes_nothing(data):
     results = os.path.join(harness.fresh_directory("dry"), "results")
     said = harness.succeed("batch", *pattern(data), *QUICK, "--dry-run", "-o", results).stdout

@@ -206,8 +206,8 @@ def test_a_given_axis_that_contradicts_the_files_is_said():
     write(folder, "TS_01.mdoc", mdoc_text(head="[T = Tilt axis angle = 85.3, binning = 1]"))
     said = dry(folder, "TS_01.mdoc", "--tilt-axis", 40)
     expect(said, "warning: --tilt-axis turns the views by 40°, and 'TS_01.mdoc', line 1 states 85.3°")
-    for same in (86, 85.3 - 180):
-        assert "--tilt-axis turns" not in dry(folder, "TS_01.mdoc", "--tilt-axis", same)
+    assert "--tilt-axis turns" not in dry(folder, "TS_01.mdoc", "--tilt-axis", 86)
+    expect(dry(folder, "TS_01.mdoc", "--tilt-axis", 85.3 - 180), "--tilt-axis turns")  # mirrors the tomogram
     nominal = write_series("nominal_axis", 85.3, stack="TS_01.mrcs")
     write(nominal, "TS_01.star", "\ndata_TS_01\n\nloop_\n_rlnMicrographName\n"
           "_rlnTomoNominalStageTiltAngle\n_rlnTomoNominalTiltAxisAngle\n"
@@ -502,6 +502,34 @@ def test_the_table_of_aretomo_3_has_no_dark_frames():
     expect(dry(folder, "TS_01.aln", "--ctf", "short.txt", status=2), "short.txt", "4 sections", "15")
 
 
+def test_the_table_of_aretomo_has_the_order_of_its_alignment():
+    """AreTomo 2 sorts the views by tilt; the stack stays in the order of recording."""
+    recorded = sorted(range(len(TILTS)), key=lambda i: abs(TILTS[i]))  # [section]: its place by tilt
+    folder = write_series("recorded", tilts=[TILTS[i] for i in recorded])
+    write(folder, "TS_01.aln", "# RawSize = 72 56 15\n# NumPatches = 0\n" + "".join(
+        f"{recorded.index(i)} 0 1 0 0 1 1 1 0 {TILTS[i]}\n" for i in range(len(TILTS))))
+    write(folder, "TS_01_CTF.txt", ctf_text([30000 + 1000 * i for i in range(len(TILTS))]))
+    write(folder, "ctffind.txt", "# Output from CTFFind version 4.1.14\n" +
+          ctf_text([30000 + 1000 * i for i in recorded]))
+    volumes = []
+    for table in ("TS_01_CTF.txt", "ctffind.txt"):
+        output = os.path.join(folder, table + ".mrc")
+        harness.succeed("reconstruct", "TS_01.aln", "--epochs", 1, "--coarse-epochs", 0, "--contrast", "bright",
+                        "--thickness", 24, "--bead-diameter", 0, "--ctf", table, "-o", output, cwd=folder)
+        volumes.append(harness.read_volume(output))
+    assert np.array_equal(*volumes)
+
+
+def test_a_defocus_that_no_view_has_is_named():
+    folder = write_series("micrometres")
+    for defocus, part in ((3.2, "a defocus of 3.2 Å"), (-30000, "a defocus of -3e+04 Å")):
+        write(folder, "TS_ctf.txt", ctf_text([defocus] * len(TILTS)))
+        said = harness.succeed("reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--ctf", "TS_ctf.txt",
+                               "--thickness", 24, "--epochs", 1, "--coarse-epochs", 0, "--tv", 5, "--prior", "tv",
+                               "--tv-penalty", "smooth", "--overwrite", "-o", "out.mrc", cwd=folder)
+        expect(said.stderr, "warning:", part, "under focus", "in 15 of its sections")
+
+
 def test_the_angles_of_aretomo_3_have_three_columns():
     folder = write_series("columns")
     order = np.argsort(np.argsort(np.abs(TILTS), kind="stable"), kind="stable") + 1
@@ -580,6 +608,13 @@ def test_a_table_in_another_order_than_the_views_is_named():
     said = harness.succeed("reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--ctf", "TS.defocus",
                            *short, cwd=folder)
     expect(said.stderr, "the tilt angles of", "'TS.defocus'", "order of the sections")
+    order = sorted(range(len(TILTS)), key=lambda i: abs(TILTS[i]))
+    write(folder, "TS.defocus", "".join(
+        f"{row + 1} {row + 1} {TILTS[i]} {TILTS[i]} {3000 + 10 * i}{' 2' if row == 0 else ''}\n"
+        for row, i in enumerate(order)))
+    said = harness.succeed("reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--ctf", "TS.defocus",
+                           *short, cwd=folder)
+    expect(said.stderr, "'TS.defocus' lists the views in another order", "matched by their tilts")
     rows = "".join(f"{i + 1} 0 1 0 0 1 1 1 0 {-tilt}\n" for i, tilt in enumerate(TILTS))
     write(folder, "TS.aln", f"# RawSize = 72 56 {len(TILTS)}\n# NumPatches = 0\n" + rows)
     said = dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--aln", "TS.aln")

@@ -229,11 +229,14 @@ def test_fiducials_and_hot_pixels_are_masked(directory, write_series):
 def test_what_cannot_be_is_refused(directory, plain):
     small = os.path.join(directory, "small.mrc")
     harness.write_stack(small, np.ones((2, HEIGHT, WIDTH), dtype=np.int16))
+    no_numbers = os.path.join(directory, "no_numbers.mrc")
+    harness.write_stack(no_numbers, np.full((len(TILTS), HEIGHT, WIDTH), np.nan, dtype=np.float32))
     text = os.path.join(directory, "bad.txt")
     with open(text, "w") as file:
         file.write("10 20 0\n10 twenty 0\n")
     output = os.path.join(harness.fresh_directory("refused"), "out.mrc")
     for options, parts in [(["--mask", small], ["small.mrc", "2 sections"]),
+                           (["--mask", no_numbers], ["no_numbers.mrc", "no number", "section"]),
                            (["--fiducials", text], ["bad.txt", "line 2", "twenty"]),
                            (["--bead-diameter", "big"], ["--bead-diameter", "big"]),
                            (["--bead-diameter", "-3"], ["--bead-diameter", "-3"]),

@@ -157,6 +157,37 @@ def test_ctrl_c_is_obeyed_while_another_thread_reconstructs(series, quick):
         timer.join()
 
 
+def test_ctrl_c_is_obeyed_while_an_array_is_converted(tmp_path):
+    values = np.random.default_rng(1).random((300, 300, 300))
+    for delay_s in (0.005, 0.01, 0.02):
+        timer = threading.Timer(delay_s, _thread.interrupt_main)
+        is_finished = False
+        with pytest.raises(KeyboardInterrupt):
+            timer.start()
+            tomofield.write_mrc(tmp_path / "t.mrc", values, 1.0, overwrite=True)
+            is_finished = True
+            time.sleep(10)
+        assert not is_finished, delay_s
+        timer.join()
+
+
+def test_a_folder_that_changes_meanwhile_moves_no_output(series, quick, tmp_path, monkeypatch):
+    for name in ("begun", "other"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "other" / "t.mrc").write_text("precious", encoding="utf-8")
+    monkeypatch.chdir(tmp_path / "begun")
+    tomofield.reconstruct(series.views, series.tilt_deg, **quick, output="t.mrc",
+                          progress=lambda p: os.chdir(tmp_path / "other"))
+    assert (tmp_path / "begun" / "t.mrc").exists()
+    assert [path.name for path in (tmp_path / "other").iterdir()] == ["t.mrc"]
+    assert (tmp_path / "other" / "t.mrc").read_text(encoding="utf-8") == "precious"
+
+
+def test_a_null_character_does_not_end_a_sentence(series, quick):
+    with pytest.raises(tomofield.Error, match=r"x00b'.*(dB|MB)"):
+        tomofield.reconstruct(series.views, series.tilt_deg, **{**quick, "budget": "a\0b"})
+
+
 def test_any_answer_of_a_callback_counts_as_true_or_false(series, quick):
     for answer, is_finished in (([], False), ([1], True), ("", False), (0, False), (None, True)):
         made = tomofield.reconstruct(series.views, series.tilt_deg, **quick, progress=lambda p: answer)
@@ -287,6 +318,30 @@ def test_options_keep_what_they_are_set_to():
         assert (tuple(found) if name == "roi" else found) == value
     core.penalty = core.roi = core.leaf_size = None
     assert core.penalty is None and core.roi is None and core.leaf_size is None
+
+
+def test_the_interpreter_ends_beside_a_callback_that_waits():
+    """The main thread holds for ever what the callback of a daemon thread waits for."""
+    script = f"""
+import threading, time
+import numpy as np
+import tomofield
+views = np.random.default_rng(1).normal(100, 10, (21, 32, 32)).astype(np.float32)
+lock = threading.Lock()
+lock.acquire()
+begun = threading.Event()
+def wait(progress):
+    begun.set()
+    lock.acquire()
+threading.Thread(target=lambda: tomofield.reconstruct(
+    views, np.linspace(-60, 60, 21), thickness=16, pixel_size_A=10, contrast="bright", progress=wait),
+    daemon=True).start()
+begun.wait()
+"""
+    module = os.path.dirname(os.path.dirname(tomofield.__file__))
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
+                           env={**os.environ, "PYTHONPATH": module}, timeout=60, check=False)
+    assert ended.returncode == 0, ended.stderr
 
 
 @pytest.mark.parametrize("work", [

@@ -13,6 +13,7 @@
 
 #include "base/progress.h"
 #include "base/system/processors.h"
+#include "base/threads/stoppable_loops.h"
 #include "base/threads/worker_threads.h"
 #include "base/trace.h"
 
@@ -160,6 +161,7 @@ void detail::run_loop(const char* what, std::int64_t count, void (*call)(void*, 
   void* const context = thread_context();
   const auto run_index = [&](std::int64_t i) {
     allow_loop_interruption();
+    StoppableLoops::check();
     const ContextScope scope(context);
     loop.run_task(i, thread_index(), [&] { call(body, i); });
   };

@@ -17,6 +17,7 @@
 #include "base/aligned_buffer.h"
 #include "base/progress.h"
 #include "base/system/processors.h"
+#include "base/threads/stoppable_loops.h"
 
 namespace tomofield::base {
 namespace {
@@ -268,6 +269,19 @@ TEST(ParallelLoops, APageLiesOnTheNodeOfTheThreadThatWritesItFirst) {
   set_thread_count(0);
   for (std::size_t i = 0; i < kCount; ++i)
     EXPECT_EQ(node_of(&buffer[i * kBytes]), static_cast<int>(node[i])) << i;
+}
+
+TEST(Parallel, LoopsOfAThreadStopWhereTheyMay) {
+  std::atomic<int> calls = 0;
+  const auto run = [&] { parallel_for("count", 1000, [&](std::int64_t) { ++calls; }); };
+  {
+    const StoppableLoops loops([&] { return calls > 10; });
+    EXPECT_THROW(run(), StopRequested);
+    EXPECT_LT(calls, 1000);
+  }
+  calls = 0;
+  run();  // may not stop any more
+  EXPECT_EQ(calls, 1000);
 }
 
 }  // namespace

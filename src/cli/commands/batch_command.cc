@@ -184,15 +184,21 @@ void run_here(const fs::path& folder, const batch::JobList& list, const batch::R
                        fmt::join(failed, ", "), batch::summary_page(folder).string()));
 }
 
-void run_by_slurm(const BatchArguments& arguments, const batch::JobList& list, int threads,
-                  bool chooses) {
+// Returns the script of a job array. Throws Error for what cannot be submitted.
+std::string script_for(const BatchArguments& arguments, const batch::JobList& list, int threads) {
+  batch::require_sbatch();
+  return slurm_script({.program = base::program_path(),
+                       .folder = arguments.folder,
+                       .threads = threads,
+                       .more = arguments.sbatch},
+                      list.jobs);
+}
+
+void run_by_slurm(const BatchArguments& arguments, const batch::JobList& list,
+                  const std::string& script, bool chooses) {
   const fs::path folder = arguments.folder;
   if (batch::largest_first(list.jobs).empty()) return print_summary(folder);
-  const batch::SlurmOptions options{.program = base::program_path(),
-                                    .folder = folder,
-                                    .threads = threads,
-                                    .more = arguments.sbatch};
-  io::write_text_file(batch::script_of(folder), slurm_script(options, list.jobs));
+  io::write_text_file(batch::script_of(folder), script);
   const std::string choosing = chooses ? batch::submit(folder, batch::kChoosingTask) : "";
   const std::string job = batch::submit(folder, std::nullopt, choosing);
   print("script    {}\nSlurm job {}{}\n", batch::script_of(folder).string(), job,
@@ -237,6 +243,7 @@ void run(const CLI::App& command, const BatchArguments& arguments,
   const io::OutputFolder folder(options.folder);
   const io::OutputLock lock(batch::list_of(options.folder));
   batch::JobList list = plan_jobs(series, options);
+  batch::require_own_files(series, options.folder);
   if (stop_was_requested())
     throw ExitStatus(stop_status(), "stopped before the first series; nothing has been made");
   const batch::Room room{.threads = options.threads,
@@ -248,14 +255,16 @@ void run(const CLI::App& command, const BatchArguments& arguments,
   if (arguments.choose == batch::Choose::kOnce)
     choice = batch::plan_choice(options.folder, options.skips_existing, list.jobs);
   print_choosing(list, choice);
+  require_words(list);
+  const std::string script =
+      arguments.slurm && !arguments.dry_run ? script_for(arguments, list, options.threads) : "";
   if (arguments.dry_run) return;
   if (choice.stored)
     give_choice(*choice.stored, options.folder, list.jobs);
   else if (arguments.choose == batch::Choose::kOnce || !options.skips_existing)
     batch::forget_choice(options.folder);
   begin_batch(options.folder, list);
-  if (arguments.slurm)
-    return run_by_slurm(arguments, list, options.threads, !choice.choosing.empty());
+  if (arguments.slurm) return run_by_slurm(arguments, list, script, !choice.choosing.empty());
   choose_for_all(run_options(options.folder, list.overwrites), choice.choosing, options.threads,
                  list);
   run_here(options.folder, list, room);

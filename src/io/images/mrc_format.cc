@@ -51,6 +51,9 @@ enum Offset : std::size_t {
 constexpr std::size_t kLabelBytes = 80;
 constexpr int kMaxLabels = 10;
 constexpr std::int32_t kImodStampValue = 1146047817;
+// Space groups of MRC2014: 0 of images, 1 of a volume, 401 of a stack of volumes, whose MZ counts
+// the sections of one.
+constexpr std::int32_t kSpaceGroupOfVolume = 1, kSpaceGroupOfVolumes = 401;
 constexpr std::int32_t kImodSignedBytes = 1;
 constexpr std::int32_t kImodPacked = 16;         // two values of 4 bits in a byte
 constexpr std::int32_t kImodOriginInverted = 4;  // ORIGIN has the sign of MRC2014
@@ -90,12 +93,15 @@ bool is_known_mode(std::int32_t mode) {
 
 bool detect_byte_swap(const MrcHeaderBytes& bytes) {
   const auto stamp = std::to_integer<int>(bytes[kMachineStamp]);
-  if (stamp == 0x44) return false;
-  if (stamp == 0x11) return true;
+  const Fields native(bytes, false), swapped(bytes, true);
+  const bool may_be_native = is_known_mode(native.int32(kMode)),
+             may_be_swapped = is_known_mode(swapped.int32(kMode));
+  // A stamp holds unless the mode makes sense in the other order alone.
+  if (stamp == 0x44 && (may_be_native || !may_be_swapped)) return false;
+  if (stamp == 0x11 && (may_be_swapped || !may_be_native)) return true;
   // Files from before MRC2014 have no stamp. Then the byte order is the one in which the mode makes
   // sense. Mode 0 is the same in both orders, so the size decides.
-  const Fields native(bytes, false), swapped(bytes, true);
-  if (native.int32(kMode) != 0) return !is_known_mode(native.int32(kMode));
+  if (native.int32(kMode) != 0) return !may_be_native;
   return static_cast<std::uint32_t>(native.int32(kSize)) >
          static_cast<std::uint32_t>(swapped.int32(kSize));
 }
@@ -221,7 +227,9 @@ MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name
   header.max = fields.float32(kMax);
   header.mean = fields.float32(kMean);
   header.rms = fields.float32(kRms);
-  header.is_volume = fields.int32(kSpaceGroup) == 1;
+  header.is_volume = fields.int32(kSpaceGroup) == kSpaceGroupOfVolume;
+  if (fields.int32(kSpaceGroup) == kSpaceGroupOfVolumes)
+    header.sections_a_volume = std::clamp<std::int64_t>(fields.int32(kSampling + 8), 1, header.nz);
   header.bytes_are_unsigned = has_unsigned_bytes(fields, header);
   header.extended_header_bytes = fields.int32(kExtendedBytes);
   if (header.extended_header_bytes < 0) {
@@ -256,11 +264,9 @@ std::int64_t expected_file_bytes(const MrcHeader& header, const std::string& nam
 
 namespace {
 
-// Returns the space group of MRC2014: 0 for images, 1 for a volume, 401 for a stack of volumes,
-// whose MZ counts the sections of one.
 std::int32_t space_group(const MrcHeader& header) {
-  if (header.sections_a_volume > 0) return 401;
-  return header.is_volume ? 1 : 0;
+  if (header.sections_a_volume > 0) return kSpaceGroupOfVolumes;
+  return header.is_volume ? kSpaceGroupOfVolume : 0;
 }
 
 }  // namespace

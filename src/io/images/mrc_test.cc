@@ -398,6 +398,17 @@ TEST(Mrc, MinimumAndMaximumTellBytesWithoutAStamp) {
   EXPECT_FALSE(reads_255(0, 0));  // MRC2014's signed bytes, where nothing tells
 }
 
+TEST(Mrc, AStampThatTheModeContradictsDoesNotCount) {
+  const ScratchDirectory scratch;
+  MrcWriter writer(scratch / "a.mrc", spec_of(2, 1, 1, MrcMode::kFloat32));
+  writer.write_section(0, std::vector<float>{-1, 5});
+  writer.close();
+  std::string bytes = testing::read_whole_file(scratch / "a.mrc");
+  bytes[212] = bytes[213] = 0x11;  // big-endian
+  scratch.write("a.mrc", bytes);
+  EXPECT_EQ(read_all(scratch / "a.mrc"), (std::vector<float>{-1, 5}));
+}
+
 TEST(Mrc, ImodStampTellsSignedFromUnsignedBytes) {
   const ScratchDirectory scratch;
   MrcWriter writer(scratch / "a.mrc", spec_of(2, 1, 1, MrcMode::kInt8));

@@ -79,6 +79,9 @@ ImageInFile place_of_image(const ViewTable& table, std::size_t row, Frames frame
 }  // namespace
 
 ImageInFile parse_image_name(std::string_view name) {
+  // RELION states the format of files with other extensions: "000001@TS_01.st:mrc".
+  for (const std::string_view format : {":mrcs", ":mrc"})
+    if (name.ends_with(format)) name.remove_suffix(format.size());
   const std::size_t at = name.find('@');
   if (at == std::string_view::npos) return {fs::path(name), std::nullopt};
   const auto number = parse_integer(name.substr(0, at));
@@ -110,8 +113,7 @@ std::shared_ptr<const ImageStack> open_view_images(const fs::path& table) {
   const Frames frames = name.starts_with("even@")  ? Frames::kEven
                         : name.starts_with("odd@") ? Frames::kOdd
                                                    : Frames::kAll;
-  const fs::path file = frames == Frames::kAll ? table : fs::path(name.substr(name.find('@') + 1));
-  return image_stack_of_files(find_view_images(read_view_table(file), frames), name);
+  return image_stack_of_files(find_view_images(read_view_table(table), frames), name);
 }
 
 }  // namespace tomofield::io

@@ -31,6 +31,8 @@ TEST(ViewImages, HaveTheNamesOfRelion) {
   EXPECT_EQ(parse_image_name("d/a.mrc").section, std::nullopt);
   EXPECT_EQ(parse_image_name("000012@d/s.mrcs").file, "d/s.mrcs");
   EXPECT_EQ(parse_image_name("000012@d/s.mrcs").section, 11);
+  EXPECT_EQ(parse_image_name("000012@d/s.st:mrc").file, "d/s.st");
+  EXPECT_EQ(parse_image_name("d/s.st:mrcs").file, "d/s.st");
   for (const char* bad : {"0@s.mrc", "-1@s.mrc", "x@s.mrc", "@s.mrc"})
     expect_parts(message_of<Error>([&] { parse_image_name(bad); }), {bad, "000001@"});
 }

@@ -149,6 +149,8 @@ TEST(AreTomoAlignment, RefusesAHeaderThatContradictsTheFile) {
   expect_parts(refusal("# NumPatches = 4"), {"a.aln", "NumPatches = 4", "no rows"});
   expect_parts(refusal("# NumPatches = 1", "# Local Alignment\n0 0 1 2 0.1 0.2 abc\n"),
                {"a.aln", "line 4", "flag"});
+  expect_parts(refusal("# NumPatches = 0", "# Local Alignment\n0 0 1 2 0.1 0.2 1\n"),
+               {"a.aln", "line 4", "NumPatches = 0"});
 }
 
 TEST(AreTomoAlignment, RefusesMalformedRows) {

@@ -130,10 +130,17 @@ struct PatchRows {
 };
 
 // Throws Error unless each row of the global alignment has as many rows of the local one as the
-// file states.
+// file states, if it does.
 void require_all_patches(const std::filesystem::path& path, const AreTomoAlignment& alignment,
-                         const PatchRows& rows) {
-  if (alignment.num_patches <= 0) return;
+                         const PatchRows& rows, bool is_stated) {
+  if (alignment.num_patches <= 0) {
+    if (!rows.counts.empty() && is_stated)
+      throw Error(fmt::format(
+          "'{}', line {}: a row of the local alignment, and '# NumPatches = {}' states none: write "
+          "the right number, or delete the lines from '# Local Alignment' on",
+          path.string(), rows.last_line, alignment.num_patches));
+    return;
+  }
   if (rows.counts.empty())
     throw Error(fmt::format(
         "'{}' has no rows of the local alignment, and '# NumPatches = {}' states as many for each "
@@ -199,7 +206,7 @@ AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path, bool 
   if (alignment.rows.empty()) {
     throw Error(fmt::format("'{}' has no rows of an AreTomo alignment", path.string()));
   }
-  require_all_patches(path, alignment, patch_rows);
+  require_all_patches(path, alignment, patch_rows, stated.contains("NumPatches"));
   return alignment;
 }
 

@@ -23,6 +23,8 @@ struct CtfTable {
   std::vector<std::string> not_applied;  ///< what the file has beyond a defocus and a phase shift
   std::vector<std::optional<double>> tilt_deg = {};  ///< of `views`; empty: not in the file
   bool goes_on = false;  ///< the last defocus holds for all views after it, as in IMOD
+  /// AreTomo's, whose rows are those of its alignment, sorted by tilt.
+  bool is_of_aretomo = false;
 };
 
 /// Reads the contrast transfer of each view from any of these files, which it recognises by the end

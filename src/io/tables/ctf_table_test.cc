@@ -236,6 +236,8 @@ TEST(CtfTable, UnitsAndLimitsOfTheMicroscopeAreRefused) {
   expect_parts(refusal("acceleration voltage: 300000 keV"), {"voltage", "300000"});
   expect_parts(refusal("spherical aberration: -2.7 mm"), {"aberration", "-2.7"});
   expect_parts(refusal("amplitude contrast: 7"), {"amplitude contrast", "7"});
+  expect_parts(refusal("Columns: #2 - defocus 1 [nm]"), {"line 1", "defocus 1", "[nm]"});
+  expect_parts(refusal("#5 - additional phase shift [degrees]"), {"line 1", "[degrees]"});
 }
 
 TEST(CtfTable, ADefocusOfImodThatComesTwiceIsRefused) {

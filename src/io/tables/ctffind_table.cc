@@ -12,8 +12,9 @@
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
-// CTFFIND's text (cisTEM, src/programs/ctffind/ctffind.cpp; version 5 adds columns 8 to 10) and
-// AreTomo3's (CSaveCtfResults.cpp, which adds the hand as column 8) have the same first columns:
+// CTFFIND's text (cisTEM, src/programs/ctffind/ctffind.cpp; version 5 adds columns 8 to 10; its
+// first line names the program) and AreTomo's (CSaveCtfResults.cpp, to which version 3 adds the
+// hand as column 8; CLoadMain.cpp sorts the sections by tilt before) have the same first columns:
 // number, defocus 1 and 2 in Å, the direction of defocus 1 in degrees, phase shift in radians.
 
 namespace tomofield::io {
@@ -40,10 +41,27 @@ std::optional<double> number_after(const std::filesystem::path& path, const Text
                           path.string(), line.number, key, words[1], unit));
 }
 
+// Throws Error if a comment states another unit of a column than the one that is read:
+// "#2 - defocus 1 [Angstroms]", "#5 - additional phase shift [radians]".
+void require_unit(const std::filesystem::path& path, const TextLine& line, std::string_view column,
+                  std::string_view letters) {
+  const std::string_view text = line.text;
+  const std::size_t at = text.find(column);
+  if (at == std::string_view::npos) return;
+  const std::string_view rest = trim(text.substr(at + column.size()));
+  if (!rest.starts_with('[') || rest.substr(1).starts_with(letters)) return;
+  throw Error(fmt::format(
+      "'{}', line {}: the column '{}' is in {}, and CTFFIND writes [{}…]: "
+      "correct it",
+      path.string(), line.number, column, quote(rest.substr(0, rest.find(']') + 1)), letters));
+}
+
 void read_comment(const std::filesystem::path& path, const TextLine& line, StatedOptics& optics) {
   const auto take = [&](std::string_view key, std::string_view unit, std::optional<double>& value) {
     if (const auto number = number_after(path, line, key, unit)) value = number;
   };
+  require_unit(path, line, "defocus 1", "A");
+  require_unit(path, line, "phase shift", "rad");
   take("acceleration voltage:", "keV", optics.voltage_kV);
   take("spherical aberration:", "mm", optics.spherical_aberration_mm);
   take("amplitude contrast:", "", optics.amplitude_contrast);
@@ -83,8 +101,10 @@ Row parse_row(const std::filesystem::path& path, const TextLine& line) {
 
 CtfTable read_ctffind(const std::filesystem::path& path) {
   CtfTable table{path, {}, {}, {}};
+  table.is_of_aretomo = true;
   for (const TextLine& line : read_text_lines(path)) {
     if (line.text.starts_with('#')) {
+      if (line.text.find("CTFFind") != std::string::npos) table.is_of_aretomo = false;
       read_comment(path, line, table.optics);
       continue;
     }

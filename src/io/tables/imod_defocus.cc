@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "io/saving/atomic_file.h"
@@ -29,6 +30,7 @@ enum Flag : std::int64_t {
   kAngleInRadians = 2,
   kHasPhase = 4,
   kPhaseInRadians = 8,
+  kAnglesInverted = 16,  // ctfutils.cpp turns their sign
   kHasCutOn = 32,
 };
 
@@ -112,7 +114,8 @@ Entry parse_entry(const std::filesystem::path& path, const TextLine& line, const
     const double phase = std::abs(values[has_astigmatism ? 7 : 5]);  // as IMOD does
     defocus.phase_shift_deg = form.has(kPhaseInRadians) ? phase / kRadians : phase;
   }
-  return {first - 1, last - 1, (values[2] + values[3]) / 2, defocus};
+  const double sign = form.has(kAnglesInverted) ? -1.0 : 1.0;
+  return {first - 1, last - 1, sign * (values[2] + values[3]) / 2, defocus};
 }
 
 // Returns a defocus for each view. As in IMOD, a line of the file is about the middle view of its
@@ -138,11 +141,26 @@ std::vector<std::optional<Defocus>> interpolated(const std::map<std::int64_t, De
 
 }  // namespace
 
+namespace {
+
+// Tells whether a file is AreTomo's copy for IMOD: NAME_CTF_Imod.txt, or NAME_ctf.txt in the folder
+// NAME_Imod (CImodUtil.cpp).
+bool is_copy_of_aretomo(const std::filesystem::path& path) {
+  std::error_code failed;
+  const std::string name = path.filename().string();
+  const std::string folder =
+      std::filesystem::absolute(path, failed).parent_path().filename().string();
+  return name.ends_with("_CTF_Imod.txt") ||
+         (name.ends_with("_ctf.txt") && folder.ends_with("_Imod"));
+}
+
+}  // namespace
+
 CtfTable read_imod_defocus(const std::filesystem::path& path) {
-  if (path.filename().string().ends_with("_CTF_Imod.txt")) {
+  if (is_copy_of_aretomo(path)) {
     throw Error(fmt::format(
         "'{}' is AreTomo's copy for IMOD, which has the direction of the other defocus and, with a "
-        "phase plate, no angles: give NAME_CTF.txt, which lies beside it",
+        "phase plate, no angles: give AreTomo's NAME_CTF.txt",
         path.string()));
   }
   std::vector<TextLine> lines = read_text_lines(path);

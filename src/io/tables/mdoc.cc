@@ -47,6 +47,8 @@ double require_number(const std::filesystem::path& path, const TextLine& line,
 // The angles of a tilt axis that an .mdoc has, before it is known what they mean.
 struct StatedAxes {
   std::optional<AxisAngle> serialem, tomography, entry;
+  std::optional<AxisAngle> rotation;  // the first RotationAngle: 90° more than the axis (SerialEM)
+  int two_directions_line = 0;  // of a title that states a bidirectional or dose-symmetric scheme
 };
 
 // Notes the angle of "[T = Tilt axis angle = 85.9, binning = 1 …]" and of Tomography's
@@ -65,6 +67,9 @@ void read_title(const std::filesystem::path& path, const TextLine& line, StatedA
                       path.string(), line.number, found.value, axis->value, axis->line));
     axis = found;
   };
+  if (line.text.find("bidir =") != std::string::npos ||
+      line.text.find("dosym =") != std::string::npos)
+    axes.two_directions_line = line.number;
   set(axis_of_title(line.text), axes.serialem);
   set(tomography_axis_of_title(line.text), axes.tomography);
 }
@@ -77,6 +82,9 @@ void choose_axis(const StatedAxes& axes, Mdoc& mdoc) {
     set_axis_of_tomography(*axes.tomography, /*is_title=*/true, mdoc);
   } else if (axes.entry) {
     set_axis_of_tomography(*axes.entry, /*is_title=*/false, mdoc);
+  } else if (axes.rotation && axes.rotation->value != 0.0) {  // 0 stands for no angle
+    mdoc.unclear_axis_deg = axes.rotation;
+    mdoc.has_rotation_alone = true;
   }
 }
 
@@ -193,16 +201,15 @@ double require_dose(const std::filesystem::path& path, const TextLine& line,
                           line.number, entry.key, dose));
 }
 
-// Returns a target that a microscope can have; nothing for what is no number, as of a session
-// without one.
-std::optional<double> parse_target_um(const std::filesystem::path& path, const TextLine& line,
-                                      std::string_view word) {
-  const auto target_um = parse_number(word, kLargestDefocus_um);
-  if (!target_um && parse_number(word))
-    throw Error(fmt::format("'{}', line {}: TargetDefocus is {} µm, and from -{} to {} is possible",
-                            path.string(), line.number, word, kLargestDefocus_um,
-                            kLargestDefocus_um));
-  return target_um;
+// Returns the number of an entry; nothing for nan, of a session without it.
+std::optional<double> find_number(const std::filesystem::path& path, const TextLine& line,
+                                  const KeyValue& entry, double largest) {
+  constexpr std::array<std::string_view, 3> kNone{"nan", "NaN", "NAN"};
+  if (std::ranges::find(kNone, entry.value) != kNone.end()) return std::nullopt;
+  if (const auto number = parse_number(entry.value, largest)) return *number;
+  throw Error(fmt::format("'{}', line {}: {} is '{}', and a number from -{} to {} is expected",
+                          path.string(), line.number, entry.key, quote(entry.value), largest,
+                          largest));
 }
 
 // The entries of a section that have been read: a second one must say the same.
@@ -238,9 +245,9 @@ void read_section_entry(const std::filesystem::path& path, const TextLine& line,
     section->time_s = parse_time(entry.value);
     section->unread_time_line = section->time_s ? 0 : line.number;
   } else if (entry.key == "RotationAngle") {
-    section->rotation_deg = parse_number(entry.value, base::kLargestAngle_deg);
+    section->rotation_deg = find_number(path, line, entry, base::kLargestAngle_deg);
   } else if (entry.key == "TargetDefocus") {
-    section->target_defocus_um = parse_target_um(path, line, entry.value);
+    section->target_defocus_um = find_number(path, line, entry, kLargestDefocus_um);
   } else if (entry.key == "SubFramePath") {
     section->frame_name = without_folders(entry.value);
   } else if (entry.key == "PieceCoordinates") {
@@ -258,14 +265,13 @@ void require_same(const std::filesystem::path& path, const TextLine& line, std::
 }
 
 // Sets what an entry above all sections says.
-void read_head_entry(const std::filesystem::path& path, const TextLine& line, const KeyValue& entry,
-                     Mdoc& mdoc) {
+void read_head_entry(const KeyValue& entry, Mdoc& mdoc) {
   if (entry.key == "ImageFile") {
     mdoc.image_file = without_folders(entry.value);
   } else if (entry.key == "ImageSize") {
     mdoc.image_size_px = parse_size(entry.value);
-  } else if (entry.key == "Montage" && entry.value != "0") {
-    throw_montage(fmt::format("'{}', line {}: Montage", path.string(), line.number));
+  } else if (entry.key == "Montage") {
+    mdoc.is_montage = entry.value != "0";
   }
 }
 
@@ -291,12 +297,20 @@ bool read_common_entry(const std::filesystem::path& path, const TextLine& line,
   return true;
 }
 
-// The pieces of a montage have places, and the images of a tilt series have not.
+// The pieces of a montage have places of their own, and one tilt together. A montage of one piece a
+// view is a tilt series.
 void require_no_pieces(const std::filesystem::path& path, const Mdoc& mdoc) {
-  for (const MdocSection& section : mdoc.sections)
-    if (section.place_of_piece != mdoc.sections.front().place_of_piece)
+  constexpr double kSameTilt_deg = 0.01;
+  for (std::size_t i = 1; i < mdoc.sections.size(); ++i) {
+    const MdocSection &section = mdoc.sections[i], &before = mdoc.sections[i - 1];
+    if (section.place_of_piece != before.place_of_piece)
       throw_montage(
           fmt::format("'{}': PieceCoordinates of [ZValue = {}]", path.string(), section.section));
+    if (mdoc.is_montage && section.tilt_deg && before.tilt_deg &&
+        std::fabs(*section.tilt_deg - *before.tilt_deg) < kSameTilt_deg)
+      throw_montage(fmt::format("'{}': Montage, and the tilt of [ZValue = {}] and [ZValue = {}]",
+                                path.string(), before.section, section.section));
+  }
 }
 
 }  // namespace
@@ -324,13 +338,17 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
       continue;
     }
     const KeyValue entry = split_key_value(line.text);
+    if (entry.value.empty()) continue;  // Leginon writes entries without a value
+    if (entry.key == "RotationAngle" && !axes.rotation)
+      if (const auto angle_deg = find_number(path, line, entry, base::kLargestAngle_deg))
+        axes.rotation = AxisAngle{*angle_deg, line.number};
     if (part == Part::kOther) continue;
     if (part == Part::kSection) entries.require_new(path, line, entry);
     if (read_common_entry(path, line, entry, axes, mdoc)) continue;
     if (part == Part::kSection)
       read_section_entry(path, line, entry, &mdoc.sections.back());
     else
-      read_head_entry(path, line, entry, mdoc);
+      read_head_entry(entry, mdoc);
   }
   if (mdoc.sections.empty()) {
     throw Error(fmt::format("'{}' has no sections, [ZValue = 0] and so on: is it an .mdoc file?",
@@ -339,6 +357,7 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
   sort_and_require_unique(path, &mdoc);
   require_no_pieces(path, mdoc);
   choose_axis(axes, mdoc);
+  mdoc.two_directions_line = axes.two_directions_line;
   return mdoc;
 }
 

@@ -72,7 +72,7 @@ fs::path find_image(const std::string& movie, const std::vector<fs::path>& image
   if (found.empty()) {
     throw Error(
         fmt::format("{} is of the movie '{}', and no image in its folder is named after it "
-                    "('{}.mrc' or .tif)",
+                    "('{}.mrc' or .tif): add it, or delete the section from a copy of the file",
                     section, movie, stem));
   }
   throw Error(

@@ -52,6 +52,13 @@ std::string fault_of_times(const std::vector<MdocSection>& sections) {
   return fault;
 }
 
+// Tells whether the tilts rise or fall from section to section.
+bool are_sorted(const std::vector<MdocSection>& sections) {
+  const auto tilt = [](const MdocSection& section) { return section.tilt_deg.value_or(0.0); };
+  return std::ranges::is_sorted(sections, {}, tilt) ||
+         std::ranges::is_sorted(sections, std::ranges::greater{}, tilt);
+}
+
 }  // namespace
 
 std::optional<double> target_underfocus_um(const Mdoc& mdoc) {
@@ -69,6 +76,12 @@ AcquisitionOrder acquisition_order(const Mdoc& mdoc) {
   AcquisitionOrder as_numbered{.sections = std::vector<std::size_t>(mdoc.sections.size()),
                                .fault_of_times = fault_of_times(mdoc.sections)};
   std::iota(as_numbered.sections.begin(), as_numbered.sections.end(), 0);
+  if (as_numbered.fault_of_times.empty() && mdoc.two_directions_line > 0 &&
+      are_sorted(mdoc.sections))
+    as_numbered.fault_of_times = fmt::format(
+        "line {}: the title states two directions of tilting, the sections are sorted "
+        "by tilt and have no DateTime",
+        mdoc.two_directions_line);
   return as_numbered;
 }
 

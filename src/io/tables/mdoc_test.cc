@@ -166,6 +166,8 @@ TEST(Mdoc, ReadsTheDefocusThatTheSessionAimedAt) {
     EXPECT_FALSE(target_um(none)) << none;
   expect_parts(message_of<Error>([&] { target_um("[ZValue = 0]\nTargetDefocus = -3000\n"); }),
                {"a.mdoc", "line 2", "TargetDefocus", "-3000"});
+  expect_parts(message_of<Error>([&] { target_um("[ZValue = 0]\nTargetDefocus = low\n"); }),
+               {"a.mdoc", "line 2", "TargetDefocus", "low"});
 }
 
 TEST(Mdoc, LinesBelowAHeadOfAnotherKindAreNotOfTheSectionBefore) {
@@ -202,6 +204,34 @@ TEST(Mdoc, EntriesThatContradictEachOtherAreRefused) {
       {"a.mdoc", "line 6", "PixelSpacing", "20", "10"});
 }
 
+TEST(Mdoc, EntriesWithoutAValueStateNothing) {
+  const ScratchDirectory scratch;
+  const Mdoc mdoc = read_mdoc(scratch.write("a.mdoc",
+                                            "Voltage =\n[ZValue = 0]\nTiltAngle = 3\nExposureDose "
+                                            "=\nPriorRecordDose = \nPixelSpacing ="));
+  EXPECT_EQ(mdoc.sections[0].tilt_deg, 3.0);
+  EXPECT_FALSE(mdoc.sections[0].dose || mdoc.sections[0].prior_dose || mdoc.voltage_kV ||
+               mdoc.pixel_spacing_A);
+}
+
+TEST(Mdoc, ATitleOfTwoDirectionsLeavesSortedSectionsWithoutAnOrder) {
+  const ScratchDirectory scratch;
+  const auto fault = [&](const std::string& title, const std::string& last) {
+    return acquisition_order(read_mdoc(scratch.write(
+                                 "a.mdoc", title +
+                                               "\n[ZValue = 0]\nTiltAngle = -10\n[ZValue = 1]\n"
+                                               "TiltAngle = 0\n[ZValue = 2]\nTiltAngle = " +
+                                               last)))
+        .fault_of_times;
+  };
+  const std::string title = "[T = Tilt axis angle = 85.3, binning = 1  spot = 8  camera = 0";
+  EXPECT_EQ(fault(title + "]", "10"), "");
+  for (const char* scheme : {"  bidir = 0.0]", "  dosym = 0.0]"}) {
+    expect_parts(fault(title + scheme, "10"), {"line 1", "two directions", "DateTime"});
+    EXPECT_EQ(fault(title + scheme, "-20"), "");  // in the order of recording
+  }
+}
+
 TEST(Mdoc, MontagesAreRefused) {
   const ScratchDirectory scratch;
   const auto refusal = [&](const std::string& text) {
@@ -212,7 +242,9 @@ TEST(Mdoc, MontagesAreRefused) {
       "TiltAngle = 1\nPieceCoordinates = ";
   EXPECT_EQ(refusal("Montage = 0\n" + pieces + "0 0 1\n"), "");
   expect_parts(refusal(pieces + "900 0 0\n"), {"a.mdoc", "[ZValue = 1]", "montage"});
-  expect_parts(refusal("Montage = 1\n[ZValue = 0]\n"), {"a.mdoc", "line 1", "montage"});
+  const std::string two = "[ZValue = 0]\nTiltAngle = 1\n[ZValue = 1]\nTiltAngle = ";
+  expect_parts(refusal("Montage = 1\n" + two + "1\n"), {"a.mdoc", "Montage", "[ZValue = 1]"});
+  EXPECT_EQ(refusal("Montage = 1\n" + two + "4\n"), "");  // one piece a view
 }
 
 }  // namespace

@@ -37,17 +37,22 @@ std::optional<std::array<std::int64_t, 3>> size_of(const StarRow& row, const std
                     static_cast<std::int64_t>(pixels[2])};
 }
 
-std::optional<Defocus> defocus_of(const StarRow& row) {
+// Returns the defocus of a row. Nothing if the table has none, or if one of its numbers is left out
+// ("None").
+std::optional<Defocus> defocus_of(const StarRow& row, const StarTable& table) {
   const auto u_A = row.find_number("rlnDefocusU", kLargestDefocus_A);
   if (!u_A) return std::nullopt;
-  Defocus defocus;
-  defocus.u_A = *u_A;
-  defocus.v_A = row.find_stated_number("rlnDefocusV", kLargestDefocus_A).value_or(*u_A);
-  defocus.angle_deg =
-      row.find_stated_number("rlnDefocusAngle", base::kLargestAngle_deg).value_or(0.0);
-  defocus.phase_shift_deg =
-      row.find_stated_number("rlnPhaseShift", base::kLargestAngle_deg).value_or(0.0);
-  return defocus;
+  Defocus defocus{*u_A, *u_A, 0.0, 0.0};
+  const auto read = [&](const char* column, double largest, double& value) {
+    if (!table.has_column(column)) return true;
+    const auto found = row.find_number(column, largest);
+    value = found.value_or(0.0);
+    return found.has_value();
+  };
+  const bool is_whole = read("rlnDefocusV", kLargestDefocus_A, defocus.v_A) &
+                        read("rlnDefocusAngle", base::kLargestAngle_deg, defocus.angle_deg) &
+                        read("rlnPhaseShift", base::kLargestAngle_deg, defocus.phase_shift_deg);
+  return is_whole ? std::optional(defocus) : std::nullopt;
 }
 
 // Returns what find(column) finds in the columns of the microscope.
@@ -97,6 +102,19 @@ const StarTable& rows_of_views(const std::filesystem::path& path,
         "RELION 5, or the stack with --xf and --tlt",
         path.string()));
   }
+  if (find_table(tables, "rlnMicrographMovieName") != nullptr) {
+    throw Error(fmt::format(
+        "'{}' lists movies (_rlnMicrographMovieName), as RELION's job 'Import' writes them: give a "
+        "table of the job 'Motion correction' or a later one, which lists images "
+        "(_rlnMicrographName)",
+        path.string()));
+  }
+  if (find_table(tables, "rlnTomoTomogramsFile") != nullptr) {
+    throw Error(
+        fmt::format("'{}' is an optimisation set of RELION: give the tomograms.star that its "
+                    "_rlnTomoTomogramsFile names",
+                    path.string()));
+  }
   throw Error(fmt::format(
       "'{}' has no column _rlnMicrographName, so it is no tilt series of RELION 5", path.string()));
 }
@@ -105,7 +123,7 @@ StatedOptics optics_of(const std::filesystem::path& path, const std::vector<Star
   return optics_by([&](const char* column) { return only_number(path, tables, column); });
 }
 
-ListedView view_of(const StarRow& row, bool is_nominal) {
+ListedView view_of(const StarRow& row, const StarTable& table, bool is_nominal) {
   ListedView view;
   view.image = row.text("rlnMicrographName");
   view.even = row.find_text("rlnMicrographNameEven").value_or("");
@@ -117,15 +135,33 @@ ListedView view_of(const StarRow& row, bool is_nominal) {
             .value_or(0.0);
   } else {
     view.tilt_deg = row.number("rlnTomoYTilt", base::kLargestAngle_deg);
+    view.nominal_tilt_deg = row.find_number(kNominalTilt, base::kLargestAngle_deg);
     view.x_tilt_deg = row.find_stated_number("rlnTomoXTilt", base::kLargestAngle_deg).value_or(0.0);
     view.rotation_deg = row.number("rlnTomoZRot", base::kLargestAngle_deg);
     view.shift_x_A = row.number("rlnTomoXShiftAngst", kLargestShift_A);
     view.shift_y_A = row.number("rlnTomoYShiftAngst", kLargestShift_A);
   }
   view.dose_before = row.find_dose("rlnMicrographPreExposure");
-  row.find_stated_number("rlnDefocusU", kLargestDefocus_A);  // throws Error for None
-  view.defocus = defocus_of(row);
+  view.defocus = defocus_of(row, table);
   return view;
+}
+
+// Notes what a table has and a rigid alignment cannot honour, and the first defocus that is left
+// out of it.
+void note_what_is_left_out(const StarTable& table, ViewTable& views) {
+  constexpr const char* kDeformation = "rlnTomoDeformationCoefficients";
+  for (std::size_t i = 0; table.has_column(kDeformation) && i < table.num_rows(); ++i) {
+    const std::string coefficients = table.find(i, kDeformation).value_or("");
+    if (coefficients.find_first_of("123456789") == std::string::npos) continue;
+    views.not_applied.emplace_back("deformations of the views (_rlnTomoDeformationCoefficients)");
+    break;
+  }
+  if (!table.has_column("rlnDefocusU")) return;
+  const auto gap = std::ranges::find_if(
+      views.views, [](const ListedView& view) { return !view.defocus.has_value(); });
+  if (gap != views.views.end())
+    views.ctf_not_applied.push_back(
+        fmt::format("no defocus in row {}", gap - views.views.begin() + 1));
 }
 
 }  // namespace
@@ -194,7 +230,8 @@ ViewTable read_relion_views(const std::filesystem::path& path) {
   views.is_nominal = is_nominal;
   views.optics = optics_of(path, tables);
   for (std::size_t i = 0; i < table.num_rows(); ++i)
-    views.views.push_back(view_of(StarRow(path, table, i), is_nominal));
+    views.views.push_back(view_of(StarRow(path, table, i), table, is_nominal));
+  note_what_is_left_out(table, views);
   return views;
 }
 
@@ -210,7 +247,7 @@ CtfTable read_relion_ctf(const std::filesystem::path& path) {
   CtfTable ctf{path, {}, optics_of(path, tables), {}};
   for (std::size_t i = 0; i < table->num_rows(); ++i) {
     const StarRow row(path, *table, i);
-    ctf.views.push_back(defocus_of(row));
+    ctf.views.push_back(defocus_of(row, *table));
     ctf.tilt_deg.push_back(
         row.find_number("rlnTomoNominalStageTiltAngle", base::kLargestAngle_deg));
     if (!ctf.tilt_deg.back())

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "io/tables/star_escapes.h"
 #include "io/tables/star_parser.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -17,7 +18,8 @@ namespace tomofield::io {
 namespace {
 
 bool stands_for_nothing(const std::string& value) {
-  return value.empty() || value == "None" || value == "none" || value == "?" || value == ".";
+  return value.empty() || value == "None" || value == "none" || value == "?" || value == "." ||
+         value == "<NA>";
 }
 
 // Words that begin a part of a STAR file, in any case (Hall, J. Chem. Inf. Comput. Sci. 31, 326,
@@ -105,9 +107,14 @@ std::vector<StarTable> read_star_file(const std::filesystem::path& path) {
   if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
   std::vector<StarTable> tables;
   try {
-    for (ParsedTable& parsed : parse_star(text)) {
-      StarTable& table = tables.emplace_back(std::move(parsed.name), std::move(parsed.columns));
-      for (auto& row : parsed.rows) table.add_row(std::move(row));
+    for (ParsedTable& parsed : parse_star(escaped_star(text))) {
+      for (std::string& column : parsed.columns) column = unescaped_star(column);
+      StarTable& table =
+          tables.emplace_back(unescaped_star(parsed.name), std::move(parsed.columns));
+      for (auto& row : parsed.rows) {
+        for (std::string& cell : row) cell = unescaped_star(cell);
+        table.add_row(std::move(row));
+      }
     }
   } catch (const std::runtime_error& error) {
     // gemmi writes "line:NUMBER:COLUMN: what"

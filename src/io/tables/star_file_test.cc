@@ -127,5 +127,31 @@ TEST(StarFile, RemovesAColumn) {
   EXPECT_EQ(table.find(0, "c"), "3");
 }
 
+// RELION quotes words with blanks alone (escapeStringForSTAR() in metadata_table.cpp).
+TEST(StarFile, ReadsWordsThatRelionWritesAsTheyAre) {
+  const ScratchDirectory scratch;
+  const auto tables = read_star_file(scratch.write(
+      "a.star",
+      "# für\ndata_Müller\n\nloop_\n_näme #1\n_b #2\r\n"
+      "TS_Müller frames/Bü_0.eer # ü\ndata_01 data_02\n$A _old/A.star\nloop_1 \"_a b\"\n"
+      "x ~%41\n'é ~%' \"data_ it's\"\nx\n;first ü\r\ndata_x y\r\n;\n\n"
+      "data_next\n_single data_01\n"));
+  ASSERT_EQ(tables.size(), 2u);
+  EXPECT_EQ(tables[0].name(), "Müller");
+  const std::vector<std::pair<std::string, std::string>> rows{{"TS_Müller", "frames/Bü_0.eer"},
+                                                              {"data_01", "data_02"},
+                                                              {"$A", "_old/A.star"},
+                                                              {"loop_1", "_a b"},
+                                                              {"x", "~%41"},
+                                                              {"é ~%", "data_ it's"},
+                                                              {"x", "first ü\ndata_x y"}};
+  ASSERT_EQ(tables[0].num_rows(), rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    EXPECT_EQ(tables[0].find(i, "näme"), rows[i].first);
+    EXPECT_EQ(tables[0].find(i, "b"), rows[i].second);
+  }
+  EXPECT_EQ(tables[1].name(), "next");
+}
+
 }  // namespace
 }  // namespace tomofield::io

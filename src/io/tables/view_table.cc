@@ -53,7 +53,15 @@ bool is_view_table(const std::filesystem::path& path) {
   return extension == ".star" || extension == ".tomostar" || extension == ".xml";
 }
 
-ViewTable read_view_table(const std::filesystem::path& path) {
+std::filesystem::path without_half(const std::filesystem::path& path) {
+  const std::string name = path.string();
+  for (const std::string_view half : {"even@", "odd@"})
+    if (name.starts_with(half)) return name.substr(half.size());
+  return path;
+}
+
+ViewTable read_view_table(const std::filesystem::path& table_or_half) {
+  const std::filesystem::path path = without_half(table_or_half);
   const std::string extension = extension_of(path);
   ViewTable table = extension == ".tomostar" ? read_warp_tomostar(path)
                     : extension == ".xml"    ? read_warp_xml(path)

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -44,13 +45,14 @@ void require_possible(const StatedOptics& optics, const std::filesystem::path& f
 ///
 ///     p = Rz(rotation) Ry(tilt) Rx(x_tilt) P + shift
 struct ListedView {
-  std::string image;          ///< as the file writes it: "dir/a.mrc", "000001@stack.mrc"
-  std::string even, odd;      ///< images of half of the frames; empty: not in the file
-  bool is_used = true;        ///< false: another program left the view out
-  double tilt_deg = 0.0;      ///< rotation about +Y
-  double x_tilt_deg = 0.0;    ///< rotation about +X, before the tilt
-  double rotation_deg = 0.0;  ///< of the tilt axis, counter-clockwise from +Y
-  double shift_x_A = 0.0;     ///< in the recorded image
+  std::string image;      ///< as the file writes it: "dir/a.mrc", "000001@stack.mrc"
+  std::string even, odd;  ///< images of half of the frames; empty: not in the file
+  bool is_used = true;    ///< false: another program left the view out
+  double tilt_deg = 0.0;  ///< rotation about +Y
+  std::optional<double> nominal_tilt_deg{};  ///< that of the microscope, beside a refined one
+  double x_tilt_deg = 0.0;                   ///< rotation about +X, before the tilt
+  double rotation_deg = 0.0;                 ///< of the tilt axis, counter-clockwise from +Y
+  double shift_x_A = 0.0;                    ///< in the recorded image
   double shift_y_A = 0.0;
   std::optional<double> dose_before;  ///< electrons per Å² before the view
   std::optional<Defocus> defocus;
@@ -66,6 +68,7 @@ struct ViewTable {
   std::vector<std::string> not_applied;  ///< what the file has and a rigid alignment cannot honour
   std::vector<std::string> ctf_not_applied{};  ///< the same of the contrast transfer
   std::vector<std::string> remarks{};          ///< sentences on what the file does not have
+  std::optional<std::array<double, 2>> image_size_A{};  ///< width and height
   StatedOptics optics{};
   /// 1 or −1: the right or the left side of an aligned view at a positive tilt_deg is farther from
   /// focus. None if the file does not say.
@@ -80,8 +83,12 @@ bool has_defocus(const ViewTable& table);
 /// Returns true if a name ends like that of a table of views: .star, .tomostar, or .xml.
 bool is_view_table(const std::filesystem::path& path);
 
-/// Reads a tilt-series STAR file of RELION 5, a .tomostar or an XML file of Warp. Throws Error with
-/// the file and the row for what is missing or cannot be.
+/// Returns the table that "even@TABLE" or "odd@TABLE" names, and other paths as they are.
+std::filesystem::path without_half(const std::filesystem::path& path);
+
+/// Reads a tilt-series STAR file of RELION 5, a .tomostar or an XML file of Warp, which may be
+/// named with a half of the frames (without_half()). Throws Error with the file and the row for
+/// what is missing or cannot be.
 ViewTable read_view_table(const std::filesystem::path& path);
 
 /// These read one kind each.

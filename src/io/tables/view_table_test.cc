@@ -127,6 +127,48 @@ TEST(RelionTomograms, HaveSizesOfWholePixelsOrNone) {
                  {"tomograms.star", "TS_01", column});
 }
 
+TEST(ViewTable, ADefocusThatIsLeftOutIsNoted) {
+  const ScratchDirectory scratch;
+  const std::string row = " None 0 -60 85 0 0 3 ";
+  const auto view_table = [&](const std::string& defocus) {
+    return read_view_table(scratch.write(
+        "TS.star", kRelionHead + "a.mrc" + row + "4 4 45 0\nb.mrc" + row + defocus + "\n"));
+  };
+  EXPECT_TRUE(has_defocus(view_table("4 4 45 0")));
+  EXPECT_TRUE(view_table("4 4 45 0").ctf_not_applied.empty());
+  for (const char* gap : {"None 4 45 0", "4 None 45 0", "4 4 <NA> 0"}) {
+    const ViewTable table = view_table(gap);
+    EXPECT_FALSE(has_defocus(table)) << gap;
+    ASSERT_EQ(table.ctf_not_applied.size(), 1u) << gap;
+    expect_parts(table.ctf_not_applied[0], {"no defocus", "row 2"});
+  }
+}
+
+TEST(ViewTable, DeformationsOfRelionAreNoted) {
+  const ScratchDirectory scratch;
+  const auto noted = [&](const std::string& coefficients) {
+    return read_view_table(
+               scratch.write("TS.star",
+                             "data_t\nloop_\n_rlnMicrographName #1\n_rlnTomoYTilt #2\n_rlnTomoZRot "
+                             "#3\n_rlnTomoXShiftAngst #4\n_rlnTomoYShiftAngst "
+                             "#5\n_rlnTomoDeformationCoefficients #6\na.mrc 0 0 0 0 " +
+                                 coefficients + "\n"))
+        .not_applied;
+  };
+  EXPECT_TRUE(noted("[0,0,0,0]").empty());
+  ASSERT_EQ(noted("[0,0.5,0,0]").size(), 1u);
+  expect_parts(noted("[0,0.5,0,0]")[0], {"rlnTomoDeformationCoefficients"});
+}
+
+TEST(ViewTable, TablesOfOtherJobsOfRelionAreNamed) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::string& column) {
+    return refusal_of_views(scratch.write("TS.star", "data_t\nloop_\n_" + column + " #1\na.eer\n"));
+  };
+  expect_parts(refusal("rlnMicrographMovieName"), {"TS.star", "Import", "Motion correction"});
+  expect_parts(refusal("rlnTomoTomogramsFile"), {"TS.star", "optimisation set", "tomograms.star"});
+}
+
 TEST(ViewTable, RefusesTextInPlaceOfANumber) {
   const ScratchDirectory scratch;
   const std::vector<std::string> good{"a.mrc", "None", "0", "-60", "85", "0",
@@ -143,10 +185,14 @@ TEST(ViewTable, RefusesTextInPlaceOfANumber) {
   };
   EXPECT_EQ(refusal(good), "");
   for (std::size_t i = 0; i < names.size(); ++i) {
+    const bool may_be_absent = names[i].starts_with("rlnDefocus") || names[i] == "rlnPhaseShift";
     for (const char* bad : {"None", "many"}) {
       std::vector<std::string> words = good;
       words[i + 2] = bad;
-      expect_parts(refusal(words), {"TS.star", "row 1", names[i], bad});
+      if (may_be_absent && std::string_view(bad) == "None")
+        EXPECT_EQ(refusal(words), "") << names[i];
+      else
+        expect_parts(refusal(words), {"TS.star", "row 1", names[i], bad});
     }
   }
   expect_parts(refusal_of_views(scratch.write("TS.tomostar",

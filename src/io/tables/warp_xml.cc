@@ -377,7 +377,8 @@ ViewTable read_warp_xml(const std::filesystem::path& path) {
   }
   if (const auto sizes_A = xml.dimensions_A("VolumeDimensionsAngstrom", 3))
     table.thickness_A = sizes_A->back();
-  xml.dimensions_A("ImageDimensionsAngstrom", 2);  // throws Error for sizes that cannot be
+  if (const auto sizes_A = xml.dimensions_A("ImageDimensionsAngstrom", 2))
+    table.image_size_A = {sizes_A->front(), sizes_A->back()};
   apply_movements(xml, table);
   set_defocus(xml, table);
   table.optics = {xml.ctf_parameter("Voltage"), xml.ctf_parameter("Cs"),

@@ -163,6 +163,11 @@ void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* im
   std::vector<float> counts(image->values.size());
   mask.read_section(section, counts);
   for (std::size_t i = 0; i < counts.size(); ++i) {
+    if (!std::isfinite(counts[i]))
+      throw Error(
+          fmt::format("the mask '{}' has a pixel that is no number, in section {}: write 0 "
+                      "where a pixel is left out, and 1 elsewhere",
+                      mask.path().string(), section + 1));
     if (counts[i] != 0.0f) continue;
     image->valid[i] = 0;
     image->values[i] = 0.0f;
