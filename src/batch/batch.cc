@@ -37,9 +37,11 @@ bool is_of_batch(const fs::path& folder) {
 }
 
 // Returns the files that a batch writes beside the results, its logs and states among them.
-std::vector<fs::path> own_files(const std::vector<Series>& all, const fs::path& folder) {
+std::vector<fs::path> own_files(const std::vector<Series>& all, const PlanOptions& options) {
+  const fs::path& folder = options.folder;
   std::vector<fs::path> files{list_of(folder), summary_table(folder), summary_page(folder),
-                              choice_file(folder), script_of(folder)};
+                              script_of(folder)};
+  if (!options.skips_existing) files.push_back(choice_file(folder));
   if (std::ranges::any_of(all, is_star_file)) files.push_back(relion_table(folder));
   for (const Series& series : all) {
     Job job;
@@ -73,9 +75,9 @@ void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::
   }
 }
 
-void require_own_files(const std::vector<Series>& all, const fs::path& folder) {
-  if (is_of_batch(folder)) return;
-  const std::vector<fs::path> files = own_files(all, folder);
+void require_own_files(const std::vector<Series>& all, const PlanOptions& options) {
+  if (is_of_batch(options.folder)) return;
+  const std::vector<fs::path> files = own_files(all, options);
   const auto other =
       std::ranges::find_if(files, [](const fs::path& file) { return io::is_file(file); });
   if (other == files.end()) return;

@@ -15,9 +15,8 @@
 #include "io/tables/ctf_table.h"
 #include "io/tables/mtf_table.h"
 #include "io/tables/view_table.h"
+#include "measurement/section_rows.h"
 #include "microscope/exposure.h"
-#include "tilt_series/contradictions.h"
-#include "tilt_series/match_by_tilt.h"
 #include "tilt_series/planned_series.h"
 #include "tomofield/error.h"
 
@@ -49,14 +48,6 @@ void require_pixel_size(const tilt_series::TiltSeriesOptions& input,
                   stack));
 }
 
-// Describes the sections of a stack to which a table is matched.
-struct Sections {
-  const tilt_series::TiltSeriesOptions& input;
-  std::string stack;
-  std::int64_t count = 0;
-  std::vector<std::optional<double>> tilt_deg;  // [section], as recorded; none: not used
-};
-
 Sections sections_of(const tilt_series::TiltSeriesOptions& input,
                      const tilt_series::PlannedSeries& series) {
   const io::ImageStack& stack = series.stack();
@@ -66,79 +57,6 @@ Sections sections_of(const tilt_series::TiltSeriesOptions& input,
     sections.tilt_deg[static_cast<std::size_t>(view.section)] =
         view.tilt_deg - input.tilt_offset_deg;
   return sections;
-}
-
-// A table with a row a view: the contrast transfer, or doses.
-struct RowsOfViews {
-  std::filesystem::path file;
-  bool is_ctf = false;
-  bool is_of_aretomo = false;
-  std::size_t count = 0;
-  std::vector<std::optional<double>> tilt_deg;  // [row]; empty: not in the file
-};
-
-using RowOfSection = std::vector<std::optional<std::size_t>>;  // [section]
-
-// Returns the rows by the sections of AreTomo's alignment, which leaves dark frames out, or nothing
-// if it has another number of rows.
-std::optional<RowOfSection> rows_by_aretomo(const Sections& sections, const RowsOfViews& table) {
-  if (!sections.input.aln) return std::nullopt;
-  const auto alignment = io::read_aretomo_alignment(*sections.input.aln, /*needs_tilt=*/false);
-  if (alignment.rows.size() != table.count) return std::nullopt;
-  const auto assigned =
-      io::assign_aretomo_sections(alignment, *sections.input.aln, sections.count, sections.stack);
-  RowOfSection rows(static_cast<std::size_t>(sections.count));
-  for (std::size_t row = 0; row < table.count; ++row)
-    rows[static_cast<std::size_t>(assigned[row])] = row;
-  return rows;
-}
-
-// Returns the rows by tilt, or nothing if the tilts do not tell.
-std::optional<RowOfSection> rows_by_tilt(const Sections& sections, const RowsOfViews& table) {
-  if (table.tilt_deg.empty()) return std::nullopt;
-  return tilt_series::match_by_tilt(sections.tilt_deg, table.tilt_deg);
-}
-
-// Returns the rows of a table that has one a section. They are in the order of the sections, unless
-// their tilts are those of the sections in another order.
-RowOfSection rows_of_whole_table(const Sections& sections, const RowsOfViews& table) {
-  RowOfSection rows(table.count);
-  std::iota(rows.begin(), rows.end(), std::size_t{0});
-  if (table.tilt_deg.size() != table.count ||
-      !tilt_series::are_other_angles(sections.tilt_deg, table.tilt_deg))
-    return rows;
-  auto negated = table.tilt_deg;  // another sign of the tilts is no other order
-  for (auto& tilt_deg : negated)
-    if (tilt_deg) *tilt_deg = -*tilt_deg;
-  const bool has_other_sign = !tilt_series::are_other_angles(sections.tilt_deg, negated);
-  const auto by_tilt = has_other_sign ? std::nullopt : rows_by_tilt(sections, table);
-  if (by_tilt) {
-    base::log_info(fmt::format(
-        "'{}' lists the views in another order than '{}': its rows are matched by their tilts",
-        table.file.string(), sections.stack));
-    return *by_tilt;
-  }
-  if (table.is_ctf)
-    tilt_series::warn_of_other_angles(sections.tilt_deg, sections.stack, table.tilt_deg,
-                                      fmt::format("'{}'", table.file.string()));
-  return rows;
-}
-
-// Returns the row of a table for each section. Throws Error if neither the number of rows, nor
-// AreTomo's alignment, nor the tilts tell.
-RowOfSection rows_of_sections(const Sections& sections, const RowsOfViews& table) {
-  const bool is_whole = static_cast<std::int64_t>(table.count) == sections.count;
-  if (!is_whole || table.is_of_aretomo)
-    if (const auto rows = rows_by_aretomo(sections, table)) return *rows;
-  if (is_whole) return rows_of_whole_table(sections, table);
-  if (const auto rows = rows_by_tilt(sections, table)) return *rows;
-  throw Error(fmt::format(
-      "'{}' has the {} of {} sections, but '{}' has {}, and {}: give the file of this stack{}",
-      table.file.string(), table.is_ctf ? "contrast transfer" : "doses", table.count,
-      sections.stack, sections.count,
-      table.tilt_deg.empty() ? "it has no tilts to tell which belong together"
-                             : "their tilts do not tell which belong together",
-      table.is_ctf ? " (--ctf none goes on without it)" : ""));
 }
 
 // Adds the rows that a table of IMOD leaves out after its last one, whose defocus goes on.

@@ -2,6 +2,7 @@
 program's formula, written down here from its source, and must be reconstructed in their places."""
 
 import os
+import pathlib
 
 import numpy as np
 import pytest
@@ -225,7 +226,9 @@ def test_patch_shifts_that_no_specimen_has_are_named():
     folder = fresh_directory("impossible")
     write_views(folder, imod_place)
     path = write_aln(folder, with_patches=False)
-    with open(path, "a", encoding="utf-8") as file:
+    text = pathlib.Path(path).read_text(encoding="utf-8")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text.replace("NumPatches = 0", f"NumPatches = {len(PATCHES)}"))
         file.write("# Local Alignment\n" + "".join(
             f"{view} {p} {x} {y} {60 if x > 0 and view == 0 else 0} 0 1.0\n"
             for view in range(len(TILTS)) for p, (x, y) in enumerate(PATCHES)))
