@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <numeric>
 
 #include "base/log.h"
@@ -24,6 +25,33 @@ std::optional<RowOfSection> rows_by_aretomo(const Sections& sections, const Rows
   RowOfSection rows(static_cast<std::size_t>(sections.count));
   for (std::size_t row = 0; row < table.count; ++row)
     rows[static_cast<std::size_t>(assigned[row])] = row;
+  return rows;
+}
+
+// Returns the rows of AreTomo's table without its alignment: they are sorted by tilt. Nothing if
+// the sections are, too. Throws Error for views in another order whose tilts are not all known.
+std::optional<RowOfSection> rows_by_rank(const Sections& sections, const RowsOfViews& table) {
+  const auto& tilts = sections.tilt_deg;
+  std::vector<double> known;
+  for (const auto& tilt : tilts)
+    if (tilt) known.push_back(*tilt);
+  if (std::ranges::is_sorted(known)) return std::nullopt;
+  if (known.size() < tilts.size())
+    throw Error(fmt::format(
+        "the rows of '{}' count as those of AreTomo, which sorts the views by tilt, and '{}' has "
+        "another order and views that are left out: give AreTomo's alignment with --aln (--ctf "
+        "none "
+        "goes on without the table)",
+        table.file.string(), sections.stack));
+  std::vector<std::size_t> by_tilt(tilts.size());
+  std::iota(by_tilt.begin(), by_tilt.end(), std::size_t{0});
+  std::ranges::stable_sort(by_tilt, {}, [&](std::size_t i) { return *tilts[i]; });
+  RowOfSection rows(tilts.size());
+  for (std::size_t row = 0; row < by_tilt.size(); ++row) rows[by_tilt[row]] = row;
+  base::log_warning(fmt::format(
+      "the rows of '{}' count as those of AreTomo, which sorts the views by tilt, since no line of "
+      "it names CTFFIND: '{}' has another order",
+      table.file.string(), sections.stack));
   return rows;
 }
 
@@ -64,8 +92,15 @@ RowOfSection rows_of_sections(const Sections& sections, const RowsOfViews& table
   const bool is_whole = static_cast<std::int64_t>(table.count) == sections.count;
   if (!is_whole || table.is_of_aretomo)
     if (const auto rows = rows_by_aretomo(sections, table)) return *rows;
+  if (is_whole && table.is_of_aretomo)
+    if (const auto rows = rows_by_rank(sections, table)) return *rows;
   if (is_whole) return rows_of_whole_table(sections, table);
-  if (const auto rows = rows_by_tilt(sections, table)) return *rows;
+  if (const auto rows = rows_by_tilt(sections, table)) {
+    base::log_info(
+        fmt::format("'{}' has {} rows and '{}' {} sections: they are matched by their tilts",
+                    table.file.string(), table.count, sections.stack, sections.count));
+    return *rows;
+  }
   throw Error(fmt::format(
       "'{}' has the {} of {} sections, but '{}' has {}, and {}: give the file of this stack{}",
       table.file.string(), table.is_ctf ? "contrast transfer" : "doses", table.count,

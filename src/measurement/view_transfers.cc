@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "base/log.h"
@@ -17,6 +20,7 @@
 #include "io/tables/view_table.h"
 #include "measurement/section_rows.h"
 #include "microscope/exposure.h"
+#include "tilt_series/match_by_tilt.h"
 #include "tilt_series/planned_series.h"
 #include "tomofield/error.h"
 
@@ -34,7 +38,11 @@ void tell_of_missing_ctf(const SeriesFiles& files) {
   base::log_info(fmt::format(
       "ctf: none is given (--ctf or --defocus), so the views count as plain projections: "
       "a tomogram of them lacks contrast at low resolution and keeps the fringes of defocus{}",
-      target_um ? fmt::format("; the target of the .mdoc would be --defocus {}", *target_um) : ""));
+      target_um ? fmt::format("; the target of the .mdoc would be --defocus {}", *target_um)
+      : io::without_half(files.stack) != files.stack
+          ? fmt::format("; that of the table would be --ctf {}",
+                        io::without_half(files.stack).string())
+          : ""));
 }
 
 // Throws Error if the pixel size is the one that stands for an unknown one.
@@ -59,17 +67,47 @@ Sections sections_of(const tilt_series::TiltSeriesOptions& input,
   return sections;
 }
 
-// Adds the rows that a table of IMOD leaves out after its last one, whose defocus goes on.
-void extend(io::CtfTable& table, std::size_t count) {
+// Puts the views of a table of IMOD that ends early in their places by tilt, if it is of other
+// views than the first ones. As in IMOD, the views beside them have the defocus of the nearest one.
+// Returns false if the tilts do not tell.
+bool place_by_tilt(const Sections& sections, io::CtfTable& table) {
+  const auto is_stated = [](const auto& tilt) { return tilt.has_value(); };
+  const auto matched = std::ranges::all_of(table.tilt_deg, is_stated)
+                           ? tilt_series::match_by_tilt(table.tilt_deg, sections.tilt_deg)
+                           : std::nullopt;
+  if (!matched) return false;
+  std::map<std::size_t, io::Defocus> of_section;
+  for (std::size_t row = 0; row < matched->size(); ++row)
+    if (table.views[row]) of_section[*(*matched)[row]] = *table.views[row];
+  std::vector<std::optional<io::Defocus>> views;
+  for (std::size_t i = 0; i < sections.tilt_deg.size(); ++i) {
+    const auto after = of_section.upper_bound(i);
+    views.emplace_back(after == of_section.begin() ? after->second : std::prev(after)->second);
+  }
+  table.views = std::move(views);
+  table.tilt_deg.clear();
+  return true;
+}
+
+// Adds the views that a table of IMOD leaves out, to the last of which its last defocus goes on.
+void extend(const Sections& sections, io::CtfTable& table) {
+  const auto count = static_cast<std::size_t>(sections.count);
   if (!table.goes_on || table.views.size() >= count) return;
+  if (place_by_tilt(sections, table)) return;
   table.views.resize(count, table.views.back());
   table.tilt_deg.resize(count);
 }
 
-// Puts the rows of a table of contrast transfer into the order of the sections.
+// Puts the rows of a table of contrast transfer into the order of the sections. Those of the table
+// that lists the images are in their order.
 void match_sections(const Sections& sections, io::CtfTable& table) {
+  const SeriesFiles& files = sections.input;
+  std::error_code absent;
+  if (!sections.input.images && io::is_view_table(files.stack) &&
+      std::filesystem::equivalent(io::without_half(files.stack), table.file, absent))
+    table.tilt_deg.clear();
   const auto count = static_cast<std::size_t>(sections.count);
-  extend(table, count);
+  extend(sections, table);
   const RowOfSection rows = rows_of_sections(
       sections,
       {table.file, /*is_ctf=*/true, table.is_of_aretomo, table.views.size(), table.tilt_deg});
@@ -197,8 +235,11 @@ Recording recording_of_mdoc(const std::filesystem::path& path, bool of_view) {
   microscope::MdocExposures doses = microscope::exposures_of(mdoc);
   if (!doses.fault.empty()) {
     base::log_warning(
-        fmt::format("'{}': {}, so its doses are not used (--dose-per-tilt gives a dose)",
-                    path.string(), doses.fault));
+        fmt::format("'{}': {}, so its doses are not used ({})", path.string(), doses.fault,
+                    order.fault_of_times.empty() ? "--dose-per-tilt gives a dose"
+                                                 : "complete DateTime; or, if the stack is in the "
+                                                   "order of recording, leave the .mdoc out "
+                                                   "and give --dose-per-tilt"));
   }
   found.doses = std::move(doses.of_section);
   return found;

@@ -16,10 +16,11 @@ TEST(MatchByTilt, FindsTheRowsOfSectionsThatAreLeft) {
 }
 
 TEST(MatchByTilt, RefusesWhatIsAmbiguous) {
-  EXPECT_FALSE(match_by_tilt(Tilts{1.5}, Tilts{0, 3}));       // between two rows
-  EXPECT_FALSE(match_by_tilt(Tilts{9.0}, Tilts{0, 3, 6}));    // no row at all
-  EXPECT_FALSE(match_by_tilt(Tilts{0.0, 0.1}, Tilts{0, 3}));  // two sections of one row
-  EXPECT_FALSE(match_by_tilt(Tilts{0.2}, Tilts{0, 0, 3}));    // two rows with one tilt
+  EXPECT_FALSE(match_by_tilt(Tilts{1.5}, Tilts{0, 3}));             // between two rows
+  EXPECT_FALSE(match_by_tilt(Tilts{9.0}, Tilts{0, 3, 6}));          // no row at all
+  EXPECT_FALSE(match_by_tilt(Tilts{0.0, 3.0}, Tilts{0, 3, 3.01}));  // recorded twice, one is left
+  EXPECT_FALSE(match_by_tilt(Tilts{0.0, 0.1}, Tilts{0, 3}));        // two sections of one row
+  EXPECT_FALSE(match_by_tilt(Tilts{0.2}, Tilts{0, 0, 3}));          // two rows with one tilt
 }
 
 }  // namespace

@@ -502,6 +502,9 @@ def test_the_table_of_aretomo_3_has_no_dark_frames():
     expect(dry(folder, "TS_01.aln", "--ctf", "short.txt", status=2), "short.txt", "4 sections", "15")
 
 
+SHORT = ["--epochs", 1, "--coarse-epochs", 0, "--contrast", "bright", "--thickness", 24, "--bead-diameter", 0]
+
+
 def test_the_table_of_aretomo_has_the_order_of_its_alignment():
     """AreTomo 2 sorts the views by tilt; the stack stays in the order of recording."""
     recorded = sorted(range(len(TILTS)), key=lambda i: abs(TILTS[i]))  # [section]: its place by tilt
@@ -514,8 +517,32 @@ def test_the_table_of_aretomo_has_the_order_of_its_alignment():
     volumes = []
     for table in ("TS_01_CTF.txt", "ctffind.txt"):
         output = os.path.join(folder, table + ".mrc")
-        harness.succeed("reconstruct", "TS_01.aln", "--epochs", 1, "--coarse-epochs", 0, "--contrast", "bright",
-                        "--thickness", 24, "--bead-diameter", 0, "--ctf", table, "-o", output, cwd=folder)
+        harness.succeed("reconstruct", "TS_01.aln", *SHORT, "--ctf", table, "-o", output, cwd=folder)
+        volumes.append(harness.read_volume(output))
+    assert np.array_equal(*volumes)
+    volumes = []
+    for table in ("TS_01_CTF.txt", "ctffind.txt"):  # without the alignment
+        output = os.path.join(folder, table + ".mrc")
+        said = harness.succeed("reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", *SHORT, "--ctf", table,
+                               "--overwrite", "-o", output, cwd=folder)
+        assert ("count as those of AreTomo" in said.stderr) == (table == "TS_01_CTF.txt"), said.stderr
+        volumes.append(harness.read_volume(output))
+    assert np.array_equal(*volumes)
+    refused = harness.tomofield("reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", *SHORT, "--exclude", 2,
+                                "--ctf", "TS_01_CTF.txt", "-o", "x.mrc", cwd=folder)
+    assert refused.returncode == 2 and "--aln" in refused.stderr, refused.stderr
+
+
+def test_a_defocus_file_without_the_first_views_is_placed_by_tilt():
+    folder = write_series("late_defocus")
+    volumes = []
+    for name, first in (("late", 3), ("whole", 0)):
+        lines = [f"{row + 1} {row + 1} {TILTS[i]} {TILTS[i]} {3000 + 100 * max(i, 3)}"
+                 for row, i in enumerate(range(first, len(TILTS)))]
+        write(folder, name + ".defocus", "\n".join([lines[0] + " 2"] + lines[1:]) + "\n")
+        output = os.path.join(folder, name + ".mrc")
+        harness.succeed("reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", *SHORT, "--ctf", name + ".defocus",
+                        "-o", output, cwd=folder)
         volumes.append(harness.read_volume(output))
     assert np.array_equal(*volumes)
 

@@ -306,7 +306,7 @@ void require_no_pieces(const std::filesystem::path& path, const Mdoc& mdoc) {
     if (section.place_of_piece != before.place_of_piece)
       throw_montage(
           fmt::format("'{}': PieceCoordinates of [ZValue = {}]", path.string(), section.section));
-    if (mdoc.is_montage && section.tilt_deg && before.tilt_deg &&
+    if (mdoc.is_montage && section.place_of_piece.empty() && section.tilt_deg && before.tilt_deg &&
         std::fabs(*section.tilt_deg - *before.tilt_deg) < kSameTilt_deg)
       throw_montage(fmt::format("'{}': Montage, and the tilt of [ZValue = {}] and [ZValue = {}]",
                                 path.string(), before.section, section.section));

@@ -161,7 +161,7 @@ void note_what_is_left_out(const StarTable& table, ViewTable& views) {
       views.views, [](const ListedView& view) { return !view.defocus.has_value(); });
   if (gap != views.views.end())
     views.ctf_not_applied.push_back(
-        fmt::format("no defocus in row {}", gap - views.views.begin() + 1));
+        fmt::format("no complete defocus in row {}", gap - views.views.begin() + 1));
 }
 
 }  // namespace

@@ -140,7 +140,7 @@ TEST(ViewTable, ADefocusThatIsLeftOutIsNoted) {
     const ViewTable table = view_table(gap);
     EXPECT_FALSE(has_defocus(table)) << gap;
     ASSERT_EQ(table.ctf_not_applied.size(), 1u) << gap;
-    expect_parts(table.ctf_not_applied[0], {"no defocus", "row 2"});
+    expect_parts(table.ctf_not_applied[0], {"no complete defocus", "row 2"});
   }
 }
 
