@@ -259,6 +259,16 @@ std::vector<Series> read_star(const fs::path& path) {
   return all;
 }
 
+namespace {
+
+// Returns what names a series.
+const char* advice_on_name(const Series& series) {
+  return series.is_tomogram ? "give each tomogram an rlnTomoName of its own that can be a file's"
+                            : "give the table a column 'name'";
+}
+
+}  // namespace
+
 void check_names(const std::vector<Series>& all, base::Faults& faults) {
   std::map<std::string, const Series*> names;
   std::map<fs::path, const Series*> outputs;
@@ -267,14 +277,12 @@ void check_names(const std::vector<Series>& all, base::Faults& faults) {
                               series.name.find('/') == std::string::npos &&
                               base::printable(series.name) == series.name;
     if (!is_file_name)
-      faults.add(
-          fmt::format("{}: '{}' cannot be the name of a file; give the table a column "
-                      "'name'",
-                      series.source, series.name));
+      faults.add(fmt::format("{}: '{}' cannot be the name of a file; {}", series.source,
+                             series.name, advice_on_name(series)));
     const auto [named, is_new_name] = names.emplace(series.name, &series);
     if (!is_new_name)
-      faults.add(fmt::format("{} and {} have the same name '{}': give the table a column 'name'",
-                             named->second->source, series.source, series.name));
+      faults.add(fmt::format("{} and {} have the same name '{}': {}", named->second->source,
+                             series.source, series.name, advice_on_name(series)));
     const auto [same, is_new] =
         outputs.emplace(fs::absolute(series.output).lexically_normal(), &series);
     if (!is_new && is_new_name)

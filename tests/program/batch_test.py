@@ -543,6 +543,16 @@ def test_a_tomogram_may_be_called_like_a_placeholder():
     assert any("--series={name}" in job["command"] for job in jobs), jobs
 
 
+def test_two_tomograms_of_one_name_are_told_apart_in_the_star_file():
+    folder = harness.fresh_directory("one_name")
+    star = star_projects.write_relion(folder, harness.Series("source"))
+    lines = pathlib.Path(star).read_text(encoding="utf-8").splitlines()
+    row = next(line for line in lines if line.startswith("TS_01 "))
+    pathlib.Path(star).write_text("\n".join(lines[:lines.index(row) + 1] + [row]) + "\n", encoding="utf-8")
+    said = harness.tomofield("batch", star, *QUICK[2:], "-o", os.path.join(folder, "results"))
+    assert said.returncode == 2 and "rlnTomoName of its own" in said.stderr, said.stderr
+
+
 def test_dry_run_tells_what_is_needed_and_makes_nothing(data):
     results = os.path.join(harness.fresh_directory("dry"), "results")
     said = harness.succeed("batch", *pattern(data), *QUICK, "--dry-run", "-o", results).stdout
