@@ -8,6 +8,7 @@
 
 #include "base/system/memory.h"
 #include "batch/choice.h"
+#include "batch/file_conflicts.h"
 #include "batch/relion_table.h"
 #include "batch/series_list.h"
 #include "batch/slurm.h"
@@ -36,22 +37,6 @@ bool is_of_batch(const fs::path& folder) {
   }
 }
 
-// Returns the files that a batch writes beside the results, its logs and states among them.
-std::vector<fs::path> own_files(const std::vector<Series>& all, const PlanOptions& options) {
-  const fs::path& folder = options.folder;
-  std::vector<fs::path> files{list_of(folder), summary_table(folder), summary_page(folder),
-                              script_of(folder)};
-  if (!options.skips_existing) files.push_back(choice_file(folder));
-  if (std::ranges::any_of(all, is_star_file)) files.push_back(relion_table(folder));
-  for (const Series& series : all) {
-    Job job;
-    job.name = series.name;
-    files.push_back(log_of(folder, job));
-    files.push_back(state_file_of(folder, job));
-  }
-  return files;
-}
-
 }  // namespace
 
 void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::Faults& faults) {
@@ -75,9 +60,10 @@ void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::
   }
 }
 
-void require_own_files(const std::vector<Series>& all, const PlanOptions& options) {
+void require_own_files(const std::vector<Job>& jobs, const PlanOptions& options) {
   if (is_of_batch(options.folder)) return;
-  const std::vector<fs::path> files = own_files(all, options);
+  std::vector<fs::path> files = files_of_batch(options.folder, jobs);
+  if (options.skips_existing) std::erase(files, choice_file(options.folder));
   const auto other =
       std::ranges::find_if(files, [](const fs::path& file) { return io::is_file(file); });
   if (other == files.end()) return;

@@ -17,11 +17,9 @@ namespace tomofield::batch {
 /// there are none. Adds all mistakes to `faults`.
 void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::Faults& faults);
 
-/// Throws Error if the batch would replace or remove a file that is called like one of its own, its
-/// list, summary, choice, script, table for RELION, logs and states, and is not of an earlier
-/// batch.
-/// A batch that goes on reads the choice, and does not replace it.
-void require_own_files(const std::vector<Series>& all, const PlanOptions& options);
+/// Throws Error if one of the files of the batch itself is there and not of an earlier batch, which
+/// it would replace or remove. A batch that goes on reads the choice, and does not replace it.
+void require_own_files(const std::vector<Job>& jobs, const PlanOptions& options);
 
 /// Throws Error with every job that needs more memory than there is, also on one thread.
 void require_room(const std::vector<Job>& jobs, const Room& room);

@@ -20,18 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Returns the files of the batch itself.
-std::vector<fs::path> files_of_batch(const fs::path& folder, const std::vector<Job>& jobs) {
-  std::vector<fs::path> files{list_of(folder), summary_table(folder), summary_page(folder),
-                              choice_file(folder), script_of(folder)};
-  if (are_of_star_files(jobs)) files.push_back(relion_table(folder));
-  for (const Job& job : jobs) {
-    files.push_back(log_of(folder, job));
-    files.push_back(state_file_of(folder, job));
-  }
-  return files;
-}
-
 std::vector<fs::path> results_of(const Job& job) {
   if (!job.is_skipped) return job.files.results;
   const output::OutputPaths paths = output::output_paths(job.output);
@@ -92,6 +80,17 @@ class Writers {
 };
 
 }  // namespace
+
+std::vector<fs::path> files_of_batch(const fs::path& folder, const std::vector<Job>& jobs) {
+  std::vector<fs::path> files{list_of(folder), summary_table(folder), summary_page(folder),
+                              choice_file(folder), script_of(folder)};
+  if (are_of_star_files(jobs)) files.push_back(relion_table(folder));
+  for (const Job& job : jobs) {
+    files.push_back(log_of(folder, job));
+    files.push_back(state_file_of(folder, job));
+  }
+  return files;
+}
 
 void check_files(const fs::path& folder, const fs::path& list, const std::vector<Job>& jobs,
                  base::Faults& faults) {

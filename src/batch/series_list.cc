@@ -195,6 +195,12 @@ void tell_apart(std::vector<Series>& all) {
   }
 }
 
+// Returns what names a series.
+const char* advice_on_name(const Series& series) {
+  return series.is_tomogram ? "give each tomogram an rlnTomoName of its own that can be a file's"
+                            : "give the table a column 'name'";
+}
+
 }  // namespace
 
 std::string series_name(const fs::path& input) {
@@ -258,16 +264,6 @@ std::vector<Series> read_star(const fs::path& path) {
                    .is_tomogram = true});
   return all;
 }
-
-namespace {
-
-// Returns what names a series.
-const char* advice_on_name(const Series& series) {
-  return series.is_tomogram ? "give each tomogram an rlnTomoName of its own that can be a file's"
-                            : "give the table a column 'name'";
-}
-
-}  // namespace
 
 void check_names(const std::vector<Series>& all, base::Faults& faults) {
   std::map<std::string, const Series*> names;

@@ -125,8 +125,7 @@ void read_edf_project(Project& project) {
   if (value_of(entries, "Setup.AxisType").starts_with("Dual")) {
     throw Error(
         fmt::format("'{}' is of two axes, which are reconstructed one by one: name tilta.com or "
-                    "tiltb.com, which "
-                    "eTomo writes, or give a stack itself with its options",
+                    "tiltb.com, which eTomo writes, or give a stack itself with its options",
                     edf.string()));
   }
   if (value_of(entries, "Setup.ViewType").starts_with("Montage")) {

@@ -365,7 +365,7 @@ TEST(ImodProject, ThePixelSizeOfTheCommandsIsTakenOrCompared) {
   EXPECT_EQ(imod.warnings({"PixelSize"}).find("states pixels of"), std::string::npos);
   EXPECT_FALSE(imod.values().contains("--pixel-size"));
 
-  // That of ctfplotter is of the raw stack. UnbinnedPixelSize says the same.
+  // ctfplotter states the size of the raw stack's pixels, as UnbinnedPixelSize does.
   write("plotter", size(in_header_nm));
   for (const std::string& of_aligned :
        {size(in_header_nm), size(2 * in_header_nm),

@@ -89,6 +89,16 @@ const Format* format_of(const fs::path& path) {
   return it == formats.end() ? nullptr : &*it;
 }
 
+// Throws Error if entries are to be ignored of what has none, a stack or a folder of images.
+std::nullopt_t no_project(const Request& request) {
+  for (const std::string& entry : request.ignored)
+    if (!option_table::has_name({entry}, kTiltAxis))
+      throw Error(
+          fmt::format("--ignore {}: '{}' is no project, and has no such entry: leave it out", entry,
+                      request.path.string()));
+  return std::nullopt;
+}
+
 }  // namespace
 
 bool Project::ignores(std::string_view entry) {
@@ -120,20 +130,6 @@ void require_no_series(const Request& request) {
   throw Error(fmt::format("'{}' is one series, so leave --series {} out", request.path.string(),
                           request.series));
 }
-
-namespace {
-
-// Throws Error if entries are to be ignored of what has none, a stack or a folder of images.
-std::nullopt_t no_project(const Request& request) {
-  for (const std::string& entry : request.ignored)
-    if (!option_table::has_name({entry}, kTiltAxis))
-      throw Error(
-          fmt::format("--ignore {}: '{}' is no project, and has no such entry: leave it out", entry,
-                      request.path.string()));
-  return std::nullopt;
-}
-
-}  // namespace
 
 std::optional<Project> read_project(const Request& request) {
   std::error_code absent;

@@ -63,24 +63,27 @@ bool set_transfer_file(Project& project, const fs::path& file, const fs::path& n
   return !is_ignored;
 }
 
-// The command files of IMOD's programs for the contrast transfer, which may not be there.
-struct CtfCommands {
-  fs::path correction, plotter;
+// A command file with its entries; none if it is not there.
+struct CtfCommand {
+  fs::path file;
+  std::vector<io::CommandEntry> entries;
 
-  explicit CtfCommands(const fs::path& tilt_com)
-      : correction(command_file_beside(tilt_com, "ctfcorrection")),
-        plotter(command_file_beside(tilt_com, "ctfplotter")) {}
-  std::array<fs::path, 2> all() const { return {correction, plotter}; }
+  CtfCommand(const fs::path& tilt_com, const char* name)
+      : file(command_file_beside(tilt_com, name)) {
+    if (!io::is_file(file)) return;
+    for (io::Command& command : io::read_command_file(file))
+      entries.insert(entries.end(), command.entries.begin(), command.entries.end());
+  }
 };
 
-// Returns the entries of a command file, or none if it is not there.
-std::vector<io::CommandEntry> entries_of(const fs::path& file) {
-  if (!io::is_file(file)) return {};
-  std::vector<io::CommandEntry> entries;
-  for (io::Command& command : io::read_command_file(file))
-    entries.insert(entries.end(), command.entries.begin(), command.entries.end());
-  return entries;
-}
+// The command files of IMOD's programs for the contrast transfer.
+struct CtfCommands {
+  CtfCommand correction, plotter;
+
+  explicit CtfCommands(const fs::path& tilt_com)
+      : correction(tilt_com, "ctfcorrection"), plotter(tilt_com, "ctfplotter") {}
+  std::array<const CtfCommand*, 2> all() const { return {&correction, &plotter}; }
+};
 
 // A number above 0 that an entry of a command file states.
 struct StatedNumber {
@@ -107,12 +110,12 @@ struct StatedNumber {
 };
 
 // Returns the number of an entry in a file, if it has it. Throws Error if it has two.
-std::optional<StatedNumber> find_stated(Project& project, const fs::path& file,
+std::optional<StatedNumber> find_stated(Project& project, const CtfCommand& command,
                                         std::string_view name) {
   std::optional<StatedNumber> found;
-  for (const io::CommandEntry& entry : entries_of(file)) {
+  for (const io::CommandEntry& entry : command.entries) {
     if (lower_case(entry.name) != name || project.ignores(entry.name)) continue;
-    const StatedNumber stated = StatedNumber::of(file, entry);
+    const StatedNumber stated = StatedNumber::of(command.file, entry);
     if (found && found->value != stated.value) stated.refuse_other(*found);
     found = stated;
   }
@@ -130,14 +133,14 @@ void set_microscope(Project& project, const CtfCommands& commands, bool has_tran
                                            {"amplitudecontrast", "--amplitude-contrast", true}}};
   for (const Optics& optics : kOptics) {
     std::optional<StatedNumber> found;
-    for (const fs::path& file : commands.all()) {
-      const auto stated = find_stated(project, file, optics.entry);
+    for (const CtfCommand* command : commands.all()) {
+      const auto stated = find_stated(project, *command, optics.entry);
       if (!stated) continue;
       if (found && found->value != stated->value) stated->refuse_other(*found);
       if (!found && (has_transfer || !optics.is_of_transfer))
-        project.set(optics.option, fmt::format("{}", stated->value), file, stated->entry);
+        project.set(optics.option, fmt::format("{}", stated->value), stated->file, stated->entry);
       found = stated;
-      project.add_file(file);
+      project.add_file(stated->file);
     }
   }
 }
@@ -175,16 +178,16 @@ void set_imod_pixel_size(Project& project, const CtfCommands& commands, const St
 
 // Warns of what changes the contrast transfer and is not applied. The phase shifts that count are
 // those of the .defocus file.
-void warn_of_other_transfer(Project& project, const fs::path& file) {
+void warn_of_other_transfer(Project& project, const CtfCommand& command) {
   constexpr std::array<std::string_view, 4> kOthers{"phaseshiftindegrees", "phaseplateshift",
                                                     "cutonfrequency", "inverttiltangles"};
-  for (const io::CommandEntry& entry : entries_of(file)) {
+  for (const io::CommandEntry& entry : command.entries) {
     if (std::ranges::find(kOthers, lower_case(entry.name)) == kOthers.end()) continue;
     const auto number = io::parse_number(entry.value);
     if ((number && *number == 0.0) || project.ignores(entry.name)) continue;
-    project.warn(
-        fmt::format("'{}', line {}: {} is not applied (--ignore {} says that this is meant)",
-                    file.string(), entry.line, io::quote(entry.name), io::quote(entry.name)));
+    project.warn(fmt::format(
+        "'{}', line {}: {} is not applied (--ignore {} says that this is meant)",
+        command.file.string(), entry.line, io::quote(entry.name), io::quote(entry.name)));
   }
 }
 
@@ -211,15 +214,16 @@ void set_imod_optics(Project& project, const fs::path& tilt_com, const StackPixe
   set_microscope(project, commands, has_transfer);
   set_imod_pixel_size(project, commands, pixels);
   if (!has_transfer) return;
-  for (const fs::path& file : commands.all()) warn_of_other_transfer(project, file);
+  for (const CtfCommand* command : commands.all()) warn_of_other_transfer(project, *command);
 }
 
 bool set_imod_transfer(Project& project, const fs::path& tilt_com, const std::string& name) {
-  for (const fs::path& com : CtfCommands(tilt_com).all()) {
-    for (const io::CommandEntry& entry : entries_of(com)) {
-      const fs::path file = com.parent_path() / entry.value;
+  const CtfCommands commands(tilt_com);
+  for (const CtfCommand* command : commands.all()) {
+    for (const io::CommandEntry& entry : command->entries) {
+      const fs::path file = command->file.parent_path() / entry.value;
       if (lower_case(entry.name) != "defocusfile" || !io::is_file(file)) continue;
-      return set_transfer_file(project, file, com);
+      return set_transfer_file(project, file, command->file);
     }
   }
   return set_transfer_files(project, tilt_com.parent_path(), name);

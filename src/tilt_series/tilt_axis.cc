@@ -35,26 +35,31 @@ std::optional<double> axis_of_labels(const io::MrcHeader& header) {
   return std::nullopt;
 }
 
+std::string line_of(const std::filesystem::path& path, const io::AxisAngle& axis) {
+  return fmt::format("'{}', line {}", path.string(), axis.line);
+}
+
 std::optional<StatedAxis> axis_of_mdoc(const std::filesystem::path& path, const io::Mdoc& mdoc,
                                        bool is_aligned) {
-  const auto line = [&](const io::AxisAngle& axis) {
-    return fmt::format("'{}', line {}", path.string(), axis.line);
-  };
-  if (mdoc.tilt_axis_deg) return StatedAxis{mdoc.tilt_axis_deg->value, line(*mdoc.tilt_axis_deg)};
+  if (mdoc.tilt_axis_deg)
+    return StatedAxis{mdoc.tilt_axis_deg->value, line_of(path, *mdoc.tilt_axis_deg)};
   if (!mdoc.unclear_axis_deg || is_aligned) return std::nullopt;
   const double stated_deg = mdoc.unclear_axis_deg->value;
-  if (mdoc.has_rotation_alone) {
-    throw Error(fmt::format(
-        "{}: RotationAngle = {}° is stated without a tilt axis, which is {:.4g}° by the rule of "
-        "SerialEM: give it with --tilt-axis, or --ignore TiltAxisAngle if the views are aligned "
-        "already",
-        line(*mdoc.unclear_axis_deg), stated_deg, std::remainder(stated_deg - 90.0, 360.0)));
-  }
   throw Error(fmt::format(
       "{}: Tomography states TiltAxisAngle = {}°, which alone does not tell the tilt axis: it is "
       "{:.4g}° in most files. Give it with --tilt-axis, or --ignore TiltAxisAngle if the views are "
       "aligned already",
-      line(*mdoc.unclear_axis_deg), stated_deg, std::remainder(-stated_deg - 90.0, 360.0)));
+      line_of(path, *mdoc.unclear_axis_deg), stated_deg,
+      std::remainder(-stated_deg - 90.0, 360.0)));
+}
+
+[[noreturn]] void refuse_lone_rotation(const std::filesystem::path& path,
+                                       const io::AxisAngle& rotation) {
+  throw Error(fmt::format(
+      "{}: RotationAngle = {}° is stated without a tilt axis, which is {:.4g}° by the rule of "
+      "SerialEM: give it with --tilt-axis, or --ignore TiltAxisAngle if the views are aligned "
+      "already",
+      line_of(path, rotation), rotation.value, std::remainder(rotation.value - 90.0, 360.0)));
 }
 
 }  // namespace
@@ -79,12 +84,10 @@ std::optional<StatedAxis> find_stated_axis(const TiltSeriesOptions& options,
   if (option_table::has_name(option_table::split_names(options.ignore), kIgnoredEntry))
     return std::nullopt;
   std::optional<StatedAxis> axis;
-  const bool has_rotation_alone = mdoc && mdoc->has_rotation_alone;
-  if (has_rotation_alone) axis = axis_of_header(stack);
-  if (mdoc && !axis)
-    axis = axis_of_mdoc(*options.mdoc, *mdoc,
-                        is_aligned || (has_rotation_alone && is_transformed(stack.header())));
+  if (mdoc) axis = axis_of_mdoc(*options.mdoc, *mdoc, is_aligned);
   if (!axis) axis = axis_of_header(stack);
+  if (!axis && mdoc && mdoc->lone_rotation_deg && !is_aligned && !is_transformed(stack.header()))
+    refuse_lone_rotation(*options.mdoc, *mdoc->lone_rotation_deg);
   if (axis) axis->angle_deg = std::remainder(axis->angle_deg, 360.0);
   return axis;
 }

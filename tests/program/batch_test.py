@@ -467,11 +467,17 @@ def test_a_folder_in_the_place_of_its_own_file_is_found_first(data, name):
     assert os.listdir(folder) == [name]
 
 
-def test_a_tomogram_does_not_take_the_place_of_the_table_for_relion():
-    folder = harness.fresh_directory("relion_name")
+def write_renamed(folder, name):
+    """Writes tomograms of RELION, the first of which is called `name`, and returns their table."""
     star = star_projects.write_relion(folder, harness.Series("source"))
     text = pathlib.Path(star).read_text(encoding="utf-8")
-    pathlib.Path(star).write_text(text.replace("TS_01 ", "tomograms ", 1), encoding="utf-8")
+    pathlib.Path(star).write_text(text.replace("TS_01 ", name + " ", 1), encoding="utf-8")
+    return star
+
+
+def test_a_tomogram_does_not_take_the_place_of_the_table_for_relion():
+    folder = harness.fresh_directory("relion_name")
+    star = write_renamed(folder, "tomograms")
     results = os.path.join(folder, "results")
     said = harness.tomofield("batch", star, *QUICK[2:], "-o", results)
     assert said.returncode == 2 and "would both write" in said.stderr, said.stderr
@@ -533,9 +539,7 @@ def test_the_answer_of_sbatch_is_a_number(data, answer, number):
 
 def test_a_tomogram_may_be_called_like_a_placeholder():
     folder = harness.fresh_directory("braces")
-    star = star_projects.write_relion(folder, harness.Series("source"))
-    text = pathlib.Path(star).read_text(encoding="utf-8")
-    pathlib.Path(star).write_text(text.replace("TS_01 ", "{name} ", 1), encoding="utf-8")
+    star = write_renamed(folder, "{name}")
     results = os.path.join(folder, "results")
     harness.succeed("batch", star, *QUICK[2:], "-o", results, cwd=folder)
     with open(os.path.join(results, "batch.json"), encoding="utf-8") as file:

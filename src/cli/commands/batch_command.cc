@@ -243,7 +243,7 @@ void run(const CLI::App& command, const BatchArguments& arguments,
   const io::OutputFolder folder(options.folder);
   const io::OutputLock lock(batch::list_of(options.folder));
   batch::JobList list = plan_jobs(series, options);
-  batch::require_own_files(series, options);
+  batch::require_own_files(list.jobs, options);
   if (stop_was_requested())
     throw ExitStatus(stop_status(), "stopped before the first series; nothing has been made");
   const batch::Room room{.threads = options.threads,

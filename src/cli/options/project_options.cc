@@ -11,6 +11,7 @@
 #include "cli/options/help_formatter.h"
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
+#include "io/tables/view_table.h"
 #include "option_table/setting.h"
 #include "option_table/values.h"
 #include "projects/project.h"
@@ -62,10 +63,8 @@ std::vector<Setting> settings_for(const CLI::App& command, const projects::Proje
 
 std::string fault_of_stack(const std::filesystem::path& stack) {
   std::error_code fault;
-  const std::string text = stack.string();
-  const bool is_half = text.starts_with("even@") || text.starts_with("odd@");
-  if (is_half || std::filesystem::exists(stack, fault) || fault) return {};
-  return fmt::format("'{}' does not exist", text);
+  if (io::without_half(stack) != stack || std::filesystem::exists(stack, fault) || fault) return {};
+  return fmt::format("'{}' does not exist", stack.string());
 }
 
 void add_project_options(CLI::App& command) {

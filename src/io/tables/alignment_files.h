@@ -76,12 +76,11 @@ struct Mdoc {
   /// SerialEM's "[T = Tilt axis angle = X]", else what TiltAxisAngle and RotationAngle say together
   /// (mdoc_axis.cc). RotationAngle alone is another angle.
   std::optional<AxisAngle> tilt_axis_deg;
-  /// A TiltAxisAngle of Tomography from which the axis cannot be told, or, with
-  /// `has_rotation_alone`, a RotationAngle beside which no TiltAxisAngle stands.
+  /// A TiltAxisAngle of Tomography from which the axis cannot be told.
   std::optional<AxisAngle> unclear_axis_deg;
-  bool has_rotation_alone = false;
-  bool is_montage = false;      ///< Montage: the images may be pieces
-  int two_directions_line = 0;  ///< of a title with "bidir =" or "dosym =", or 0
+  std::optional<AxisAngle> lone_rotation_deg;  ///< a RotationAngle, where nothing states an axis
+  bool is_montage = false;                     ///< Montage: the images may be pieces
+  int two_directions_line = 0;                 ///< of a title with "bidir =" or "dosym =", or 0
   std::optional<double> voltage_kV;
   std::optional<std::array<std::int64_t, 2>> image_size_px;  ///< ImageSize: of what PixelSpacing is
   std::string image_file;  ///< ImageFile: the stack, without its folders

@@ -51,8 +51,7 @@ void require_unit(const std::filesystem::path& path, const TextLine& line, std::
   const std::string_view rest = trim(text.substr(at + column.size()));
   if (!rest.starts_with('[') || rest.substr(1).starts_with(letters)) return;
   throw Error(fmt::format(
-      "'{}', line {}: the column '{}' is in {}, and CTFFIND writes [{}…]: "
-      "correct it",
+      "'{}', line {}: the column '{}' is in {}, and CTFFIND writes [{}…]: correct it",
       path.string(), line.number, column, quote(rest.substr(0, rest.find(']') + 1)), letters));
 }
 

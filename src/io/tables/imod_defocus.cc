@@ -139,10 +139,6 @@ std::vector<std::optional<Defocus>> interpolated(const std::map<std::int64_t, De
   return views;
 }
 
-}  // namespace
-
-namespace {
-
 // Tells whether a file is AreTomo's copy for IMOD: NAME_CTF_Imod.txt, or NAME_ctf.txt in the folder
 // NAME_Imod (CImodUtil.cpp).
 bool is_copy_of_aretomo(const std::filesystem::path& path) {

@@ -83,8 +83,7 @@ void choose_axis(const StatedAxes& axes, Mdoc& mdoc) {
   } else if (axes.entry) {
     set_axis_of_tomography(*axes.entry, /*is_title=*/false, mdoc);
   } else if (axes.rotation && axes.rotation->value != 0.0) {  // 0 stands for no angle
-    mdoc.unclear_axis_deg = axes.rotation;
-    mdoc.has_rotation_alone = true;
+    mdoc.lone_rotation_deg = axes.rotation;
   }
 }
 
