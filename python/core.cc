@@ -154,11 +154,10 @@ class Listener {
   ProgressCallback callback() const {
     return [this](const Progress& progress) {
       if (must_stop()) return false;
-      const InCallback in_callback;
-      const py::gil_scoped_acquire locked;
+      const InUserCode locked;
       check_signals();
       if (callback_.is_none()) return true;
-      const py::object answer = callback_(progress);
+      const py::object answer = call(callback_, py::cast(progress));
       const int is_true = answer.is_none() ? 1 : PyObject_IsTrue(answer.ptr());
       if (is_true < 0) throw py::error_already_set();
       return is_true == 1;
@@ -185,12 +184,13 @@ auto run_with(py::object callback, const Work& work) {
 // Passes messages to the logger "tomofield". Whatever says something runs without the interpreter's
 // lock, which is taken here: else two threads could wait for each other.
 void log(MessageKind kind, std::string_view text) {
-  const py::gil_scoped_acquire locked;
+  const InUserCode locked;
   try {
     const auto message = py::reinterpret_steal<py::object>(
         PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "replace"));
-    const py::object logger = py::module_::import("logging").attr("getLogger")("tomofield");
-    logger.attr(kind == MessageKind::kWarning ? "warning" : "info")(message);
+    const py::object logger =
+        call(py::module_::import("logging").attr("getLogger"), py::str("tomofield"));
+    call(logger.attr(kind == MessageKind::kWarning ? "warning" : "info"), message);
   } catch (py::error_already_set& error) {
     if (error.matches(PyExc_Exception))
       error.discard_as_unraisable("tomofield's logger");
@@ -204,8 +204,12 @@ void log(MessageKind kind, std::string_view text) {
 std::pair<option_table::Choices, std::vector<std::string>> open(const std::filesystem::path& path,
                                                                 const std::string& series,
                                                                 const std::string& ignore) {
-  Project project = open_project({path, series, ignore});
-  for (const std::string& warning : project.warnings) log(MessageKind::kWarning, warning);
+  Project project;
+  {
+    const Unlocked unlocked;
+    project = open_project({path, series, ignore});
+    for (const std::string& warning : project.warnings) log(MessageKind::kWarning, warning);
+  }
   check_signals();
   return {{std::move(project.files), std::move(project.options)}, std::move(project.warnings)};
 }
@@ -371,6 +375,7 @@ void add_reconstruct(py::module_& module) {
   py::class_<TiltSeries>(module, "TiltSeries")
       .def_static("from_files",
                   [](const option_table::Choices& choices) {
+                    const Unlocked unlocked;
                     return TiltSeries::from_files(choices.files);
                   })
       .def_static("from_images", &series_of);

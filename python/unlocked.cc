@@ -1,5 +1,6 @@
 #include "unlocked.h"
 
+#include <cxxabi.h>
 #include <tomofield/error.h>
 #include <unistd.h>
 
@@ -22,9 +23,10 @@ namespace py = pybind11;
 struct Calls {
   std::mutex mutex;
   std::condition_variable has_changed;
-  int count = 0;         // guarded by the mutex, as are the next ones
-  int in_callbacks = 0;  // of these calls
-  bool is_over = false;  // the interpreter ends
+  int count = 0;          // guarded by the mutex, as are the next ones
+  int in_user_code = 0;   // of these calls
+  bool is_over = false;   // the interpreter ends
+  bool are_left = false;  // and waits for none of them any more
 };
 
 // It is never destroyed: daemon threads live until the process ends.
@@ -50,19 +52,36 @@ void end_if_interrupted() {
   _exit(kInterrupted);
 }
 
-// A callback may wait for what the ending thread holds. It gets some seconds, and the interpreter
-// then ends beside it.
+// Keeps the calling thread where it is until the process ends.
+[[noreturn]] void wait_for_the_end() {
+  while (true) pause();
+}
+
+// Runs what asks for the interpreter's lock. Python ends a thread that asks after the interpreter's
+// end, by unwinding it, and C++ cannot be unwound so: destructors would call Python.
+template <typename Work>
+auto stay_at_the_end(const Work& work) {
+  try {
+    return work();
+  } catch (const abi::__forced_unwind&) {
+    wait_for_the_end();
+  }
+}
+
+// Code of the user may wait for what the ending thread holds. It gets some seconds, and the
+// interpreter then ends beside it.
 void wait_for_calls() {
   if (getpid() != g_own_process) return;
   constexpr std::chrono::milliseconds kStep{100}, kPatience{5000};
   const py::gil_scoped_release released;
   std::unique_lock lock(calls().mutex);
   calls().is_over = true;
-  std::chrono::milliseconds in_callbacks{0};
+  std::chrono::milliseconds in_user_code{0};
   while (!calls().has_changed.wait_for(lock, kStep, [] { return calls().count == 0; })) {
-    const bool are_waiting = calls().count == calls().in_callbacks;
-    in_callbacks = are_waiting ? in_callbacks + kStep : kStep * 0;
-    if (in_callbacks >= kPatience) return;
+    const bool are_all = calls().count == calls().in_user_code;
+    in_user_code = are_all ? in_user_code + kStep : kStep * 0;
+    calls().are_left = in_user_code >= kPatience;
+    if (calls().are_left) return;
     lock.unlock();
     end_if_interrupted();
     lock.lock();
@@ -83,18 +102,37 @@ Unlocked::Counted::~Counted() {
   calls().has_changed.notify_all();
 }
 
-InCallback::InCallback() {
+InUserCode::Counted::Counted() {
   const std::lock_guard lock(calls().mutex);
-  ++calls().in_callbacks;
+  ++calls().in_user_code;
 }
 
-InCallback::~InCallback() {
+InUserCode::Counted::~Counted() {
   const std::lock_guard lock(calls().mutex);
-  --calls().in_callbacks;
+  --calls().in_user_code;
+}
+
+InUserCode::InUserCode() {
+  stay_at_the_end([&] { locked_.emplace(); });
+}
+
+py::object call(const py::object& function, const py::object& argument) {
+  PyObject* const answer = stay_at_the_end(
+      [&] { return PyObject_CallFunctionObjArgs(function.ptr(), argument.ptr(), nullptr); });
+  if (answer == nullptr) throw py::error_already_set();
+  return py::reinterpret_steal<py::object>(answer);
 }
 
 Unlocked::Unlocked(Stops stops) { t_stops_anywhere = stops == Stops::kAnywhere; }
-Unlocked::~Unlocked() { t_stops_anywhere = false; }
+
+Unlocked::~Unlocked() {
+  t_stops_anywhere = false;
+  const bool is_left = [] {
+    const std::lock_guard lock(calls().mutex);
+    return calls().are_left;
+  }();
+  if (is_left) wait_for_the_end();  // it cannot have the lock any more
+}
 
 // Ends work that has no callback once the interpreter ends, or by what a handler of signals raises.
 // Only one thread in a tenth of a second takes the interpreter's lock.

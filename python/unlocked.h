@@ -3,6 +3,7 @@
 #include <pybind11/pybind11.h>
 
 #include <exception>
+#include <optional>
 
 namespace tomofield::python {
 
@@ -31,15 +32,26 @@ class Unlocked {
   pybind11::gil_scoped_release released_;
 };
 
-/// While it lives, the calling thread is in a callback of the user, who may wait for anything. It
-/// is made and ends without the interpreter's lock.
-class InCallback {
+/// Takes the interpreter's lock in a thread that has given it up, to run code of the user, who may
+/// wait or compute for any time. The interpreter's end does not wait for that: the thread then
+/// stays where it is until the process ends.
+class InUserCode {
  public:
-  InCallback();
-  ~InCallback();
-  InCallback(const InCallback&) = delete;
-  InCallback& operator=(const InCallback&) = delete;
+  InUserCode();
+  InUserCode(const InUserCode&) = delete;
+  InUserCode& operator=(const InUserCode&) = delete;
+
+ private:
+  struct Counted {
+    Counted();
+    ~Counted();
+  };
+  Counted counted_;  // the first member: it ends after the lock was given back
+  std::optional<pybind11::gil_scoped_acquire> locked_;
 };
+
+/// Calls a function of the user, within InUserCode. Throws what it raises.
+pybind11::object call(const pybind11::object& function, const pybind11::object& argument);
 
 /// Returns true once the interpreter ends.
 bool must_stop();
@@ -51,7 +63,7 @@ void keep_for_later(std::exception_ptr raised);
 void check_signals();
 
 /// Lets the interpreter wait at its end for what runs in C++, and Ctrl-C stop what has no callback.
-/// It waits for no longer than some seconds for callbacks alone, and Ctrl-C ends the process.
+/// It waits for no longer than some seconds for code of the user, and Ctrl-C ends the process.
 void wait_at_exit();
 
 }  // namespace tomofield::python

@@ -320,28 +320,43 @@ def test_options_keep_what_they_are_set_to():
     assert core.penalty is None and core.roi is None and core.leaf_size is None
 
 
-def test_the_interpreter_ends_beside_a_callback_that_waits():
-    """The main thread holds for ever what the callback of a daemon thread waits for."""
+@pytest.mark.parametrize("place", ("progress", "filter"))
+@pytest.mark.parametrize("body", ("lock.acquire()", "while True: pass", "time.sleep(6)"))
+def test_the_interpreter_ends_beside_code_of_the_user(place, body):
+    """It runs in a daemon thread, and the end does not wait for it longer than for some seconds."""
     script = f"""
-import threading, time
+import builtins, logging, threading, time
 import numpy as np
 import tomofield
 views = np.random.default_rng(1).normal(100, 10, (21, 32, 32)).astype(np.float32)
 lock = threading.Lock()
 lock.acquire()
 begun = threading.Event()
-def wait(progress):
+def stay(*given):
     begun.set()
-    lock.acquire()
+    {body}
+    return True
+progress = None
+if {place!r} == "filter":
+    logging.getLogger("tomofield").setLevel(logging.INFO)
+    logging.getLogger("tomofield").addFilter(stay)
+else:
+    progress = stay
 threading.Thread(target=lambda: tomofield.reconstruct(
-    views, np.linspace(-60, 60, 21), thickness=16, pixel_size_A=10, contrast="bright", progress=wait),
-    daemon=True).start()
+    views, np.linspace(-60, 60, 21), thickness=16, pixel_size_A=10, contrast="bright",
+    density_variation=1.0, prior="tv", progress=progress), daemon=True).start()
 begun.wait()
+
+class Last:  # lets other threads run while the interpreter ends
+    def __del__(self, sleep=time.sleep):
+        sleep(2)
+
+builtins.last = Last()
 """
     module = os.path.dirname(os.path.dirname(tomofield.__file__))
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
                            env={**os.environ, "PYTHONPATH": module}, timeout=60, check=False)
-    assert ended.returncode == 0, ended.stderr
+    assert ended.returncode == 0, (ended.returncode, ended.stderr)
 
 
 @pytest.mark.parametrize("work", [
@@ -351,7 +366,7 @@ begun.wait()
     "model.sample(tomofield.Box((16, 16, 8), (700, 700, 700), euler_deg=(10, 20, 30)))"])
 def test_the_interpreter_ends_in_order_beside_a_daemon_thread(series, work):
     script = f"""
-import threading, time
+import builtins, threading, time
 import numpy as np
 import tomofield
 views = np.random.default_rng(1).normal(100, 10, (21, 32, 32)).astype(np.float32)
@@ -369,7 +384,7 @@ class Last:  # lets other threads run while the interpreter ends
     def __del__(self, sleep=time.sleep):
         sleep(1)
 
-last = Last()
+builtins.last = Last()
 """
     module = os.path.dirname(os.path.dirname(tomofield.__file__))
     for _ in range(3):
