@@ -25,18 +25,6 @@ namespace fs = std::filesystem;
 
 constexpr double kGibibyte = 1 << 30;
 
-bool is_star_file(const Series& series) { return series.input.extension() == ".star"; }
-
-// Tells whether a folder has the summary or the list of an earlier batch.
-bool is_of_batch(const fs::path& folder) {
-  if (has_summary(folder)) return true;
-  try {
-    return io::is_file(list_of(folder)) && !read_jobs(list_of(folder)).jobs.empty();
-  } catch (const Error&) {
-    return false;
-  }
-}
-
 }  // namespace
 
 void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::Faults& faults) {
@@ -48,7 +36,7 @@ void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::
   }
   check_names(all, faults);
   check_placeholders(all, options.common, faults);
-  if (std::ranges::any_of(all, is_star_file)) outputs.push_back(relion_table(options.folder));
+  check_tomograms(all, options.common, faults);
   faults.collect([&] { io::require_no_input_is_replaced(outputs, inputs); });
   if (options.skips_existing || options.overwrites) return;
   for (const Series& series : all) {
@@ -58,19 +46,6 @@ void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::
                       "replaces it",
                       series.source, series.output.string()));
   }
-}
-
-void require_own_files(const std::vector<Job>& jobs, const PlanOptions& options) {
-  if (is_of_batch(options.folder)) return;
-  std::vector<fs::path> files = files_of_batch(options.folder, jobs);
-  if (options.skips_existing) std::erase(files, choice_file(options.folder));
-  const auto other =
-      std::ranges::find_if(files, [](const fs::path& file) { return io::is_file(file); });
-  if (other == files.end()) return;
-  throw Error(
-      fmt::format("'{}' is not of an earlier batch, and a batch writes or removes a file of this "
-                  "name: give another folder with --output, or move the file",
-                  other->string()));
 }
 
 void require_room(const std::vector<Job>& jobs, const Room& room) {

@@ -17,10 +17,6 @@ namespace tomofield::batch {
 /// there are none. Adds all mistakes to `faults`.
 void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::Faults& faults);
 
-/// Throws Error if one of the files of the batch itself is there and not of an earlier batch, which
-/// it would replace or remove. A batch that goes on reads the choice, and does not replace it.
-void require_own_files(const std::vector<Job>& jobs, const PlanOptions& options);
-
 /// Throws Error with every job that needs more memory than there is, also on one thread.
 void require_room(const std::vector<Job>& jobs, const Room& room);
 

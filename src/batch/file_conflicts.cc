@@ -6,11 +6,7 @@
 #include <string>
 #include <system_error>
 
-#include "batch/choice.h"
-#include "batch/relion_table.h"
-#include "batch/slurm.h"
-#include "batch/state_record.h"
-#include "batch/summary.h"
+#include "batch/own_files.h"
 #include "io/saving/file_identity.h"
 #include "io/saving/output_files.h"
 #include "output/output_paths.h"
@@ -80,17 +76,6 @@ class Writers {
 };
 
 }  // namespace
-
-std::vector<fs::path> files_of_batch(const fs::path& folder, const std::vector<Job>& jobs) {
-  std::vector<fs::path> files{list_of(folder), summary_table(folder), summary_page(folder),
-                              choice_file(folder), script_of(folder)};
-  if (are_of_star_files(jobs)) files.push_back(relion_table(folder));
-  for (const Job& job : jobs) {
-    files.push_back(log_of(folder, job));
-    files.push_back(state_file_of(folder, job));
-  }
-  return files;
-}
 
 void check_files(const fs::path& folder, const fs::path& list, const std::vector<Job>& jobs,
                  base::Faults& faults) {

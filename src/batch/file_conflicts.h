@@ -8,11 +8,6 @@
 
 namespace tomofield::batch {
 
-/// Returns the files of the batch itself: its list, summary, choice, script and table for RELION,
-/// and the logs and states of its jobs.
-std::vector<std::filesystem::path> files_of_batch(const std::filesystem::path& folder,
-                                                  const std::vector<Job>& jobs);
-
 /// Adds a mistake if a file that a job or the batch itself would write is
 /// written by another one too, or is read by any: the series, their angles, …, and `list`, the
 /// table or STAR file of the series. Files are the same if they are so on the disk, however their

@@ -32,6 +32,7 @@ struct Needs {
 /// The files that a job reads and writes.
 struct JobFiles {
   std::vector<std::filesystem::path> inputs, results;
+  std::string relion_tomogram;  ///< in the row that it writes for RELION, or empty
 };
 
 /// The reconstruction of one series.

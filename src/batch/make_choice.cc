@@ -19,9 +19,8 @@ namespace fs = std::filesystem;
 
 // Lets a job make its trials, and returns its vote.
 Vote let_vote(const RunOptions& options, const Job& job, int threads) {
-  const fs::path folder = log_folder(options.folder) / "choice";
-  fs::create_directories(folder);
-  const fs::path answer = folder / (job.name + ".json"), log = folder / (job.name + ".log");
+  const auto [answer, log] = trial_files_of(options.folder, job);
+  fs::create_directories(log.parent_path());
   fs::remove(answer);
   std::vector<std::string> command =
       command_of(options.program, job, threads,
@@ -36,6 +35,11 @@ Vote let_vote(const RunOptions& options, const Job& job, int threads) {
 }
 
 }  // namespace
+
+TrialFiles trial_files_of(const fs::path& folder, const Job& job) {
+  const fs::path trials = log_folder(folder) / "choice";
+  return {.answer = trials / (job.name + ".json"), .log = trials / (job.name + ".log")};
+}
 
 bool make_choice(const RunOptions& options, const std::vector<std::size_t>& choosing, int threads,
                  JobList& list) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <vector>
 
@@ -9,6 +10,12 @@
 #include "batch/run_jobs.h"
 
 namespace tomofield::batch {
+
+/// The files of the trials by which a job chooses for all: what it chose, and what it said.
+struct TrialFiles {
+  std::filesystem::path answer, log;
+};
+TrialFiles trial_files_of(const std::filesystem::path& folder, const Job& job);
 
 /// Lets some jobs of a list make their trials, one after another, each with all threads. Stores
 /// what they choose together in the folder of the batch, gives it to all jobs that lack it, and

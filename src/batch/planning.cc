@@ -10,6 +10,7 @@
 #include "base/system/child_process.h"
 #include "batch/file_conflicts.h"
 #include "batch/placeholders.h"
+#include "batch/relion_table.h"
 #include "batch/series_list.h"
 #include "io/saving/output_folder.h"
 
@@ -20,7 +21,7 @@ namespace fs = std::filesystem;
 using option_table::GivenOption;
 
 GivenOption option_for(const Series& series, GivenOption option, const std::string& where) {
-  if (series.is_tomogram && option.flag == "--series") return option;
+  if (series.is_tomogram && option.flag == kSeriesOption) return option;
   if (option.value) option.value = fill_placeholders(series.input, *option.value, where);
   return option;
 }
@@ -41,7 +42,7 @@ std::vector<std::string> plan_command(const PlanOptions& options, const Job& job
 
 void add_plan(const record::PlanRecord& plan, Job& job) {
   job.needs = needs_of(plan);
-  job.files = {plan.inputs, plan.results};
+  job.files = {plan.inputs, plan.results, plan.relion_tomogram};
 }
 
 // The stacks of the series so far. A pattern may name a stack and the alignment or the metadata
@@ -91,6 +92,18 @@ void check_placeholders(const std::vector<Series>& all, const std::vector<GivenO
       faults.collect([&] { option_for(series, option, place_of(series, option)); });
 }
 
+void check_tomograms(const std::vector<Series>& all, const std::vector<GivenOption>& common,
+                     base::Faults& faults) {
+  const bool names_one = std::ranges::any_of(
+      common, [](const GivenOption& option) { return option.flag == kSeriesOption; });
+  const auto listed = std::ranges::find_if(all, &Series::is_tomogram);
+  if (!names_one || listed == all.end()) return;
+  faults.add(fmt::format(
+      "the tomograms of '{}' are the series: leave {} out, or reconstruct the one that it names "
+      "with `tomofield reconstruct`",
+      listed->input.string(), kSeriesOption));
+}
+
 JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
   const io::ScratchFolder scratch(options.folder, ".tomofield-plan");
   const fs::path plan = scratch.plan(), log = scratch.log();
@@ -103,8 +116,9 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
             .command = command_of(series, options.common),
             .needs = {},
             .is_skipped = options.skips_existing && has_results(series.output),
-            .files = {.inputs = {series.input}, .results = {}}};
+            .files = {.inputs = {series.input}, .results = {}, .relion_tomogram = {}}};
     if (job.is_skipped) {
+      job.files.relion_tomogram = tomogram_of_result(job);
       if (const std::string fault = fault_of_results(series.output); !fault.empty())
         faults.add(fmt::format("{}: {}: {}", series.source, fault, advice_on_files(series.output)));
     } else {
@@ -126,6 +140,7 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
   }
   check_files(options.folder, options.list, list.jobs, faults);
   require_none(faults);
+  warn_of_equal_tomograms(list.jobs);
   return list;
 }
 

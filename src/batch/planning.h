@@ -37,6 +37,10 @@ std::vector<std::string> command_of(const Series& series,
 void check_placeholders(const std::vector<Series>& all,
                         const std::vector<option_table::GivenOption>& common, base::Faults& faults);
 
+/// Adds a mistake if an option names one series of a table of RELION, which are all reconstructed.
+void check_tomograms(const std::vector<Series>& all,
+                     const std::vector<option_table::GivenOption>& common, base::Faults& faults);
+
 /// Makes a job of every series, and runs each with --plan to check it and to find what it needs.
 /// Series that are skipped must have readable results, and are not checked otherwise. The outputs
 /// of the series are there. Throws Error with the mistakes of all series, also if a file would be

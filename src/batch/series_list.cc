@@ -260,7 +260,7 @@ std::vector<Series> read_star(const fs::path& path) {
                    .source = fmt::format("'{}' of '{}'", tomogram.name, path.string()),
                    .input = path,
                    .output = {},
-                   .options = {{"--series", tomogram.name}},
+                   .options = {{kSeriesOption, tomogram.name}},
                    .is_tomogram = true});
   return all;
 }

@@ -13,6 +13,9 @@ namespace tomofield::batch {
 /// Throws Error if there is a mistake. Of several, logs each on a line of its own before.
 void require_none(const base::Faults& mistakes);
 
+/// The option that names one series of a project.
+inline constexpr const char* kSeriesOption = "--series";
+
 /// One series of a batch, as a table or a pattern names it.
 struct Series {
   std::string name;              ///< of its files and in the summary

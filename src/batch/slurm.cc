@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 
 #include "base/code_text.h"
 #include "base/plausible.h"
@@ -26,6 +27,7 @@ constexpr std::int64_t kMebibyte = std::int64_t{1} << 20;
 constexpr double kMoreMemory = 1.2;  // estimates are within 10 %
 constexpr double kMoreTime = 3;      // nodes differ, and others use them too
 constexpr double kLeastMinutes = 15;
+constexpr std::int64_t kMostJobs = UINT32_MAX;  // the numbers of jobs have 32 bits
 
 // Returns a whole number of the environment from 1 to `most`.
 std::optional<std::int64_t> number_in_environment(const char* name, std::int64_t most) {
@@ -90,6 +92,18 @@ Script line_for_sbatch(const std::string& option) {
                   io::quote(option)));
 }
 
+// The first lines of the script.
+constexpr std::string_view kFirstLine = "#!/bin/sh\n", kFirstOption = "--job-name=tomofield";
+
+// Returns what sbatch said, or the beginning of an answer that is long.
+std::string answer_in(const fs::path& file) {
+  std::string said(1 << 16, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(said.data(), std::ssize(said));
+  said.resize(static_cast<std::size_t>(stream.gcount()));
+  return std::string(io::trim(said));
+}
+
 // Returns the number of the job in what sbatch says, the last line of the form NUMBER or
 // NUMBER;CLUSTER. Notes of the site may stand around it.
 std::optional<std::string> job_number_in(std::string_view said) {
@@ -97,9 +111,8 @@ std::optional<std::string> job_number_in(std::string_view said) {
   while (!said.empty()) {
     const std::size_t end = std::min(said.find('\n'), said.size());
     const std::string_view line = io::trim(said.substr(0, end));
-    const std::string_view number = line.substr(0, line.find(';'));
-    if (!number.empty() && number.find_first_not_of("0123456789") == std::string_view::npos)
-      found = std::string(number);
+    const auto number = io::parse_integer(line.substr(0, line.find(';')));
+    if (number && *number > 0 && *number <= kMostJobs) found = std::to_string(*number);
     said.remove_prefix(std::min(end + 1, said.size()));
   }
   return found;
@@ -124,13 +137,24 @@ SlurmGrant slurm_grant() {
 fs::path script_of(const fs::path& folder) { return folder / "batch.sbatch"; }
 fs::path list_of(const fs::path& folder) { return folder / "batch.json"; }
 
+fs::path answer_of(const fs::path& folder, std::optional<int> task) {
+  return log_folder(folder) / (task ? fmt::format("sbatch-{}.out", *task) : "sbatch.out");
+}
+
+bool has_script(const fs::path& folder) {
+  const std::string start = fmt::format("{}#SBATCH {}\n", kFirstLine, kFirstOption);
+  std::string text(start.size(), '\0');
+  std::ifstream file(script_of(folder));
+  return file.read(text.data(), std::ssize(text)) && text == start;
+}
+
 std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jobs) {
   const fs::path logs = fs::absolute(log_folder(options.folder));
-  Script script = "#!/bin/sh\n";
+  Script script = Script::made(std::string(kFirstLine));
   // If an option comes twice, sbatch takes the last.
   const auto add = [&](const Script& option) { script += Script::format("#SBATCH {}\n", option); };
   const auto word = [](const fs::path& path) { return Script::of(path.string()); };
-  add("--job-name=tomofield");
+  add(Script::made(std::string(kFirstOption)));
   add(Script::format("--cpus-per-task={}", options.threads));
   add(Script::format("--mem={}M", memory_MiB(jobs, options.threads)));
   add(Script::format("--time={:.0f}", minutes(jobs, options.threads)));
@@ -164,14 +188,15 @@ std::string submit(const fs::path& folder, std::optional<int> task, const std::s
   if (task) command.push_back(fmt::format("--array={}", *task));
   if (!after.empty()) command.push_back("--dependency=afterany:" + after);
   command.push_back(fs::absolute(script_of(folder)).string());
-  const fs::path answer =
-      log_folder(folder) / (task ? fmt::format("sbatch-{}.out", *task) : "sbatch.out");
+  const fs::path answer = answer_of(folder, task);
   const base::ChildResult result = base::run_child(command, answer, {});
-  const std::string said(io::trim(io::read_text_file(answer)));
+  const std::string said = answer_in(answer);
   if (result.exit_status == 127)
     throw Error("sbatch is not there: --slurm needs a machine from which jobs are submitted");
   if (result.exit_status != 0)
-    throw Error(fmt::format("sbatch refused '{}': {}", script_of(folder).string(), said));
+    throw Error(
+        fmt::format("sbatch refused '{}': {}", script_of(folder).string(),
+                    said.empty() ? base::reason_of_failure(result.exit_status, answer) : said));
   if (const auto number = job_number_in(said)) return *number;
   throw Error(fmt::format(
       "sbatch was given '{}' and answered '{}', in which no line is the number of a job: look with "

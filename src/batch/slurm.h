@@ -37,8 +37,14 @@ std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jo
 std::filesystem::path script_of(const std::filesystem::path& folder);
 std::filesystem::path list_of(const std::filesystem::path& folder);
 
+/// Tells whether the file that is called as the script is a script of a batch.
+bool has_script(const std::filesystem::path& folder);
+
 /// The task that makes the choice for all series (make_choice.h); the jobs are counted from 1.
 inline constexpr int kChoosingTask = 0;
+
+/// Returns the file of what sbatch answers about all tasks, or about one.
+std::filesystem::path answer_of(const std::filesystem::path& folder, std::optional<int> task);
 
 /// Throws Error unless this machine has sbatch.
 void require_sbatch();

@@ -1,6 +1,7 @@
 #include "batch/state_record.h"
 
 #include <cstdint>
+#include <optional>
 
 #include "base/plausible.h"
 #include "io/json.h"
@@ -21,21 +22,34 @@ fs::path state_file_of(const fs::path& folder, const Job& job) {
   return log_folder(folder) / (job.name + ".state.json");
 }
 
-State read_state(const fs::path& folder, const Job& job) {
+namespace {
+
+std::optional<State> find_state(const fs::path& file) {
   try {
-    const json state = io::read_json(state_file_of(folder, job));
+    const json state = io::read_json(file);
     const auto progress = base::enum_named<Progress>(state.at("progress").get<std::string>());
-    if (!progress) return {};
-    return {.progress = *progress,
-            .reason = state.at("reason").get<std::string>(),
-            .costs = {.core_seconds = io::number_at(state, "core_seconds", 0, base::kLargestNumber),
-                      .wall_seconds = io::number_at(state, "wall_seconds", 0, base::kLargestNumber),
-                      .peak_bytes = io::integer_at(state, "peak_bytes", 0, INT64_MAX)}};
+    if (!progress) return std::nullopt;
+    return State{
+        .progress = *progress,
+        .reason = state.at("reason").get<std::string>(),
+        .costs = {.core_seconds = io::number_at(state, "core_seconds", 0, base::kLargestNumber),
+                  .wall_seconds = io::number_at(state, "wall_seconds", 0, base::kLargestNumber),
+                  .peak_bytes = io::integer_at(state, "peak_bytes", 0, INT64_MAX)}};
   } catch (const json::exception&) {
-    return {};
+    return std::nullopt;
   } catch (const Error&) {
-    return {};
+    return std::nullopt;
   }
+}
+
+}  // namespace
+
+bool has_state(const fs::path& folder, const Job& job) {
+  return find_state(state_file_of(folder, job)).has_value();
+}
+
+State read_state(const fs::path& folder, const Job& job) {
+  return find_state(state_file_of(folder, job)).value_or(State{});
 }
 
 void write_state(const fs::path& folder, const Job& job, const State& state) {

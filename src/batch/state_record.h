@@ -27,6 +27,8 @@ std::filesystem::path log_folder(const std::filesystem::path& folder);
 std::filesystem::path log_of(const std::filesystem::path& folder, const Job& job);
 std::filesystem::path state_file_of(const std::filesystem::path& folder, const Job& job);
 
+/// Tells whether there is a state of a job that can be read.
+bool has_state(const std::filesystem::path& folder, const Job& job);
 /// Reads the state of a job. Returns one that waits if there is none, or none that can be read:
 /// it only informs.
 State read_state(const std::filesystem::path& folder, const Job& job);

@@ -234,7 +234,7 @@ void write_summary(const fs::path& folder, const std::vector<Job>& jobs) {
     io::OutputSet files;
     io::write_text_file(summary_table(folder), csv_text(lines));
     io::write_text_file(summary_page(folder), page_text(fs::absolute(folder), lines));
-    if (are_of_star_files(jobs)) write_relion_table(folder, finished_jobs(lines));
+    write_relion_table(folder, jobs, finished_jobs(lines));
     files.commit();
   } catch (const Error& error) {
     base::log_warning(fmt::format("the summary is old: {}", error.what()));

@@ -78,8 +78,14 @@ void set_halves(const fs::path& volume, io::StarTable& table) {
 }  // namespace
 
 std::optional<fs::path> relion_output(const options::ReconstructOptions& options) {
-  if (find_origin(options) == nullptr || obstacle(options) != nullptr) return std::nullopt;
+  if (!relion_tomogram(options)) return std::nullopt;
   return output::output_paths(options.run.output).tomogram_star;
+}
+
+std::optional<std::string> relion_tomogram(const options::ReconstructOptions& options) {
+  const Setting* const origin = find_origin(options);
+  if (origin == nullptr || obstacle(options) != nullptr) return std::nullopt;
+  return origin->row;
 }
 
 std::optional<io::StarTable> read_relion_output(const fs::path& volume) {

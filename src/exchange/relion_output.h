@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "io/tables/star_file.h"
 #include "options/run_options.h"
@@ -11,6 +12,9 @@ namespace tomofield::exchange {
 /// Returns the path of the tomograms.star that a run writes beside its volume: NAME.star if the
 /// series came from a tomograms.star of RELION, else nothing.
 std::optional<std::filesystem::path> relion_output(const options::ReconstructOptions& options);
+
+/// Returns the name of the tomogram in that file, or nothing if none is written.
+std::optional<std::string> relion_tomogram(const options::ReconstructOptions& options);
 
 /// Reads the row that a run has written beside a volume. Returns nothing if there is none, or if
 /// the file of that name is of something else.

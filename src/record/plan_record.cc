@@ -66,7 +66,8 @@ PlanRecord plan_from(const json& plan) {
                   .result_bytes = count_at(plan, "result_bytes"),
                   .disk_bytes = count_at(plan, "disk_bytes"),
                   .inputs = files_at(plan, "inputs"),
-                  .results = files_at(plan, "results")};
+                  .results = files_at(plan, "results"),
+                  .relion_tomogram = plan.at("relion_tomogram").get<std::string>()};
   if (!plan.at("core_seconds").is_null())
     read.core_seconds = io::number_at(plan, "core_seconds", 0, base::kLargestNumber);
   return read;
@@ -94,7 +95,8 @@ void write_plan(const fs::path& file, const PlanRecord& plan) {
                         {"result_bytes", plan.result_bytes},
                         {"disk_bytes", plan.disk_bytes},
                         {"inputs", texts_of(plan.inputs)},
-                        {"results", texts_of(plan.results)}});
+                        {"results", texts_of(plan.results)},
+                        {"relion_tomogram", base::utf8_text(plan.relion_tomogram)}});
 }
 
 PlanRecord read_plan(const fs::path& file) { return read_plan_file(file, plan_from); }

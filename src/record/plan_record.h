@@ -30,6 +30,7 @@ struct PlanRecord {
   std::int64_t result_bytes = 0;            ///< of the files that stay
   std::int64_t disk_bytes = 0;              ///< at most, while it runs
   std::vector<std::filesystem::path> inputs = {}, results = {};
+  std::string relion_tomogram = {};  ///< in the row that the run writes for RELION, or empty
 };
 
 void write_plan(const std::filesystem::path& file, const PlanRecord& plan);

@@ -30,7 +30,8 @@ PlanRecord example() {
           .result_bytes = 7,
           .disk_bytes = 9,
           .inputs = {"a.mrc", "a.tlt"},
-          .results = {"out/a.mrc", "out/a.h5"}};
+          .results = {"out/a.mrc", "out/a.h5"},
+          .relion_tomogram = "TS_01"};
 }
 
 TEST(PlanRecord, IsReadAsItIsWritten) {
@@ -48,6 +49,7 @@ TEST(PlanRecord, IsReadAsItIsWritten) {
   EXPECT_FALSE(read.open_spike_rank);
   EXPECT_EQ(read.inputs, plan.inputs);
   EXPECT_EQ(read.results, plan.results);
+  EXPECT_EQ(read.relion_tomogram, "TS_01");
   plan.core_seconds.reset();
   write_plan(file, plan);
   EXPECT_FALSE(read_plan(file).core_seconds.has_value());

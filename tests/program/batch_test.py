@@ -355,6 +355,50 @@ def test_a_table_for_relion_has_the_series_with_results():
     assert names("--overwrite", "--roi", "8,8,40,28") == []  # RELION has no place for a part
 
 
+def write_one_tomogram(folder, name):
+    """Makes a project folder of RELION with one tomogram and returns its row in a table of a batch."""
+    star = pathlib.Path(star_projects.write_relion(folder, harness.Series("source")))
+    lines = star.read_text(encoding="utf-8").splitlines()
+    kept = [line.replace("TS_01 ", f"{name} ", 1) for line in lines if not line.startswith("TS_02")]
+    star.write_text("\n".join(kept) + "\n", encoding="utf-8")
+    return [star.parent, pathlib.Path(folder).name]
+
+
+def test_the_tables_of_relion_in_several_folders_are_joined():
+    folder = pathlib.Path(harness.fresh_directory("relion_folders"))
+    rows = [write_one_tomogram(folder / name, name) for name in ("D1", "D2")]
+    table = write_table(folder / "list.csv", [["stack", "name"], *rows])
+    harness.succeed("batch", table, *QUICK[2:], "-o", folder / "results", cwd=folder)
+    rows = star_projects.read_rows(str(folder / "results/tomograms.star"))
+    assert [row["rlnTomoName"] for row in rows] == ["D1", "D2"]
+    mine = folder / "results/tomograms.star"
+    mine.write_text("of somebody else", encoding="utf-8")
+    said = harness.tomofield("batch", table, *QUICK[2:], "-o", folder / "results", "--overwrite", cwd=folder)
+    assert said.returncode == 2 and "tomograms.star" in said.stderr and "earlier batch" in said.stderr, said.stderr
+    assert mine.read_text(encoding="utf-8") == "of somebody else"
+    views = harness.succeed("batch", "D1/*/*/tilt_series/*.star", *QUICK, "--dry-run", "-o", "other", cwd=folder)
+    assert "2 of 2 series" in views.stdout, views
+
+
+def test_one_series_of_each_project_can_be_named():
+    folder = pathlib.Path(harness.fresh_directory("relion_series"))
+    star = pathlib.Path(star_projects.write_relion(folder, harness.Series("source")))
+    several = harness.tomofield("batch", f"{star.parent}/", "--dry-run", "-o", "other", cwd=folder)
+    assert several.returncode == 2 and "name one with --series" in several.stderr, several.stderr
+    harness.succeed("batch", f"{star.parent}/", "--series", "TS_02", *QUICK[2:], "--dry-run", "-o", "other", cwd=folder)
+    listed = harness.tomofield("batch", star, "--series", "TS_02", "--dry-run", "-o", "other", cwd=folder)
+    assert listed.returncode == 2 and "leave --series out" in listed.stderr, listed.stderr
+
+
+def test_two_tomograms_of_one_name_are_not_joined():
+    folder = pathlib.Path(harness.fresh_directory("relion_names"))
+    rows = [write_one_tomogram(folder / name, "same") for name in ("D1", "D2")]
+    table = write_table(folder / "list.csv", [["stack", "name"], *rows])
+    said = harness.succeed("batch", table, *QUICK[2:], "-o", folder / "results", cwd=folder)
+    assert "'same' in their tables" in said.stderr, said.stderr
+    assert not (folder / "results/tomograms.star").exists()
+
+
 def test_all_mistakes_are_found_before_anything_starts(data):
     folder = harness.fresh_directory("mistakes")
     results = os.path.join(folder, "results")
@@ -526,7 +570,29 @@ def test_what_slurm_cannot_take_leaves_the_earlier_batch_as_it_is(data):
     assert files == {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
 
 
-@pytest.mark.parametrize("answer, number", [("note\\n55;cluster\\nsbatch: more\\n", "55"), ("queued\\n", None)])
+def test_files_of_others_in_the_folder_of_a_batch_stay(data):
+    """A batch has its list, its summary and its page; others of its names may be of somebody else."""
+    folder = pathlib.Path(harness.fresh_directory("others_in_batch"))
+    results = folder / "results"
+    command = ["batch", os.path.join(data, "a.mrc"), *pattern(data)[1:], *QUICK, "-o", results]
+    harness.succeed(*command)
+    for name in ("choice.json", "batch.sbatch", "logs/b.log", "logs/b.state.json", "logs/choice/b.log"):
+        mine = results / name
+        mine.parent.mkdir(exist_ok=True)
+        mine.write_text("precious", encoding="utf-8")
+        inputs = os.path.join(data, "[ab].mrc")
+        said = harness.tomofield("batch", inputs, *command[2:], "--overwrite", "--slurm",
+                                 env=fake_sbatch(folder, "55\\n"))
+        assert said.returncode == 2 and name in said.stderr and "earlier batch" in said.stderr, said.stderr
+        assert mine.read_text(encoding="utf-8") == "precious"
+        mine.unlink()
+    for _ in range(2):  # the second finds the script of the first
+        harness.succeed(*command, "--overwrite", "--slurm", env=fake_sbatch(folder, "55\\n"))
+
+
+@pytest.mark.parametrize("answer, number", [
+    ("note\\n55;cluster\\nsbatch: more\\n", "55"), ("queued\\n", None), ("0\\n", None),
+    ("99999999999999999999999\\n", None), ("4294967296\\n", None), ("\\0\\0\\n", None)])
 def test_the_answer_of_sbatch_is_a_number(data, answer, number):
     folder = harness.fresh_directory("answer")
     said = harness.tomofield("batch", os.path.join(data, "a.mrc"), *pattern(data)[1:], *QUICK, "--slurm",
@@ -534,7 +600,17 @@ def test_the_answer_of_sbatch_is_a_number(data, answer, number):
     if number:
         assert said.returncode == 0 and f"Slurm job {number}" in said.stdout, said
     else:
-        assert said.returncode == 2 and "'queued'" in said.stderr, said.stderr
+        assert said.returncode == 2 and "look with squeue" in said.stderr, said.stderr
+
+
+def test_an_sbatch_that_fails_silently_has_its_status(data):
+    folder = harness.fresh_directory("silent")
+    environment = fake_sbatch(folder, "")
+    with open(os.path.join(folder, "sbatch"), "a", encoding="utf-8") as program:
+        program.write("exit 3\n")
+    said = harness.tomofield("batch", os.path.join(data, "a.mrc"), *pattern(data)[1:], *QUICK, "--slurm",
+                             "-o", os.path.join(folder, "results"), env=environment)
+    assert said.returncode == 2 and "failed with status 3" in said.stderr, said.stderr
 
 
 def test_a_tomogram_may_be_called_like_a_placeholder():

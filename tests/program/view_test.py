@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import socket
+import subprocess
 import urllib.parse
 
 import numpy as np
@@ -162,6 +163,14 @@ def test_a_connection_serves_for_several_requests(viewer):
     assert answer.count(b"HTTP/1.1 200 OK") == 2 and answer.count(b"</html>") == 2, answer[:400]
 
 
+def test_head_has_no_body(viewer):
+    request = f"{{}} {viewer.path} HTTP/1.1\r\nHost: 127.0.0.1:{viewer.port}\r\nConnection: {{}}\r\n\r\n"
+    with connect(viewer, (request.format("HEAD", "keep-alive") + request.format("GET", "close")).encode()) as connection:
+        answer = b"".join(iter(lambda: connection.recv(1 << 16), b""))
+    head, _, rest = answer.partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 405") and rest.startswith(b"HTTP/1.1 200 OK"), answer[:400]
+
+
 def test_the_work_of_a_request_is_bounded(viewer):
     for volume in (0, 1):
         for right in (X, "0.8,0.6,0"):
@@ -233,6 +242,13 @@ def test_what_cannot_be_shown_is_named(results):
         result = harness.tomofield("view", *arguments)
         assert result.returncode == 2 and fact in result.stderr, (arguments, result.stderr)
         assert not result.stdout
+
+
+def test_a_view_whose_address_cannot_be_printed_ends(results):
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        run = subprocess.run([harness.PROGRAM, "view", results.volume_path], stdout=full, stderr=subprocess.PIPE,
+                             text=True, timeout=20, check=False)
+    assert run.returncode == 1 and "what was printed cannot be written" in run.stderr, run
 
 
 @pytest.fixture(scope="module", name="window")

@@ -15,6 +15,7 @@
 #include "batch/batch.h"
 #include "batch/choice.h"
 #include "batch/make_choice.h"
+#include "batch/own_files.h"
 #include "batch/run_jobs.h"
 #include "batch/series_list.h"
 #include "batch/slurm.h"
@@ -24,8 +25,10 @@
 #include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
 #include "cli/options/number_checks.h"
+#include "cli/options/project_options.h"
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
+#include "io/is_file.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_folder.h"
 #include "io/saving/output_lock.h"
@@ -76,7 +79,8 @@ batch::KnownColumns known_columns(const CLI::App& reconstruct) {
 // Reads which series there are. Adds the mistakes of a table to `faults`.
 std::vector<batch::Series> read_series(const CLI::App& program, const std::string& list,
                                        base::Faults& faults) {
-  const std::string ending = fs::path(list).extension().string();
+  const bool is_pattern = !io::is_file(list) && list.find_first_of("*?[") != std::string::npos;
+  const std::string ending = is_pattern ? "" : fs::path(list).extension().string();
   if (ending == ".star") return batch::read_star(list);
   if (ending != ".csv" && ending != ".tsv") return batch::expand_pattern(list);
   return batch::read_table(list, known_columns(*program.get_subcommand("reconstruct")), faults);
@@ -343,6 +347,7 @@ void add_batch_command(CLI::App& program) {
       "batch", "Reconstruct many series, with a summary of all; failures do not stop the others");
   auto arguments = std::make_shared<BatchArguments>();
   const auto own_options = add_own_options(command, *arguments);
+  add_project_options(command);
   add_series_options(command, arguments->choices);
   add_groups(command, arguments->choices,
              {Group::kTransfer, Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume,

@@ -8,6 +8,7 @@
 #include "base/threads/parallel.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
+#include "exchange/relion_output.h"
 #include "io/saving/output_files.h"
 #include "plan/plan.h"
 #include "reconstruct/run_files.h"
@@ -63,7 +64,8 @@ record::PlanRecord record_of(const options::ReconstructOptions& options, const p
           .result_bytes = static_cast<std::int64_t>(estimate.result_bytes),
           .disk_bytes = static_cast<std::int64_t>(estimate.disk_bytes),
           .inputs = inputs_of(options),
-          .results = reconstruction::result_files(options)};
+          .results = reconstruction::result_files(options),
+          .relion_tomogram = exchange::relion_tomogram(options).value_or("")};
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ void run_view(const ViewArguments& arguments) {
   stop_on_signals();
   print("{}\nOpen this address in a browser of this machine. Ctrl-C ends the view.\n",
         server.address());
-  flush_output();
+  if (!output_fault().empty()) return;  // nobody knows the address; the program says so
   server.run(stop_was_requested);
 }
 

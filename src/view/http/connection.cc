@@ -140,11 +140,13 @@ bool Connection::has_head() const {
 
 Request Connection::take_request() {
   enter(State::kWaiting);
+  wants_body_ = true;
   const std::size_t end = input_.find(kEndOfHead);
   if (end > kLargestHead)
     throw Error(fmt::format("the head of a request may have {} bytes", kLargestHead));
   Request request = parse_request(std::string_view(input_).substr(0, end));
   input_.erase(0, end + kEndOfHead.size());
+  wants_body_ = request.method != "HEAD";
   return request;
 }
 
@@ -154,7 +156,7 @@ void Connection::answer(Response response, bool keeps_open) {
       "HTTP/1.1 {} {}\r\n{}{}Content-Type: {}\r\nContent-Length: {}\r\nConnection: {}\r\n\r\n",
       response.status, reason_of(response.status), kHeaders, response.more_headers, response.type,
       response.body.size(), keeps_open ? "keep-alive" : "close");
-  output_ = std::move(response.body);
+  output_ = wants_body_ ? std::move(response.body) : std::string();
   output_.insert(0, head);
   enter(State::kWriting);
   last_sent_ = since_;

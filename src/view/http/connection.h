@@ -74,6 +74,7 @@ class Connection {
   std::string input_, output_;
   std::size_t sent_ = 0;
   Clock::time_point last_sent_;
+  bool wants_body_ = true;  // HEAD has only the head of an answer
   bool keeps_open_ = false;
 };
 
