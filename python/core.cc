@@ -36,72 +36,11 @@ namespace tomofield::python {
 namespace {
 
 namespace py = pybind11;
+// An array of numbers in C's order. The Python layer makes them of whatever a user gives
+// (_checks.py): to do it here would run NumPy and code of the user below C++, which Python cannot
+// unwind if the interpreter ends meanwhile.
 template <class Number>
-using Array = py::array_t<Number, py::array::c_style | py::array::forcecast>;
-
-// Calls a function of NumPy with an array and returns what it makes. Throws Error if NumPy raises:
-// it may lack memory, or was told to refuse numbers (np.seterr, python -W error); then `otherwise`
-// says what is wrong.
-template <typename... Arguments>
-py::object numpy_array(const std::string& otherwise, Arguments&&... arguments) {
-  try {
-    return py::module_::import("numpy").attr("asarray")(std::forward<Arguments>(arguments)...);
-  } catch (py::error_already_set& error) {
-    if (!error.matches(PyExc_Exception)) throw;  // of a handler of signals, such as Ctrl-C
-    if (!error.matches(PyExc_MemoryError)) throw Error(otherwise);
-    throw Error("there is too little memory for a copy of an array that is computed with: " +
-                std::string(py::str(error.value())));
-  }
-}
-
-// Lets NumPy raise an exception for numbers that a type cannot hold, for as long as it lives.
-class StrictConversion {
- public:
-  StrictConversion()
-      : state_(py::module_::import("numpy").attr("errstate")(py::arg("over") = "raise")) {
-    state_.attr("__enter__")();
-  }
-  // Handlers of signals may run at the first step of Python's function, which then did nothing:
-  // what they raise is kept for check_signals(), and the function is called again.
-  ~StrictConversion() {
-    constexpr int kTries = 3;
-    for (int i = 0; i < kTries; ++i) {
-      try {
-        state_.attr("__exit__")(py::none(), py::none(), py::none());
-        return;
-      } catch (py::error_already_set&) {
-        keep_for_later(std::current_exception());
-      }
-    }
-  }
-  StrictConversion(const StrictConversion&) = delete;
-  StrictConversion& operator=(const StrictConversion&) = delete;
-
- private:
-  py::object state_;
-};
-
-// Returns an array of real numbers from whatever NumPy makes one of. All arrays of users pass here:
-// NumPy would drop imaginary parts and masks, and read texts and dates as numbers.
-template <class Number>
-Array<Number> numbers_of(const py::object& object) {
-  if (py::module_::import("numpy").attr("ma").attr("is_masked")(object).cast<bool>())
-    throw Error(
-        "an array with masked elements says nothing in their places: fill them (numpy.ma.filled), "
-        "or leave them out");
-  const py::array array = numpy_array("an array of numbers is needed", object);
-  if (std::string_view("biuf").find(array.dtype().kind()) == std::string_view::npos)
-    throw Error("an array of real numbers is needed, not one of type " +
-                py::str(array.dtype()).cast<std::string>());
-  py::object converted = [&] {
-    const StrictConversion strict;
-    return numpy_array("an array of type " + py::str(array.dtype()).cast<std::string>() +
-                           " has numbers that are too large",
-                       array, py::dtype::of<Number>(), "C");
-  }();
-  check_signals();
-  return converted;
-}
+using Array = py::array_t<Number, py::array::c_style>;
 
 // Hands a vector over to numpy without a copy.
 py::array_t<float> to_array(std::vector<float> values, std::vector<py::ssize_t> shape) {
@@ -125,17 +64,14 @@ std::vector<float> values_of(const Array<float>& array) {
   return {array.data(), array.data() + array.size()};
 }
 
-Tomogram to_tomogram(const py::object& volume, double voxel_size_A) {
-  const Array<float> array = numbers_of<float>(volume);
+Tomogram to_tomogram(const Array<float>& array, double voxel_size_A) {
   require_dimensions(array, 3, "a volume is an array [z, y, x]");
   return {.size = {array.shape(2), array.shape(1), array.shape(0)},
           .voxel_size_A = voxel_size_A,
           .values = values_of(array)};
 }
 
-TiltSeries series_of(const py::object& views, const py::object& tilts_deg) {
-  const Array<float> images = numbers_of<float>(views);
-  const Array<double> tilts = numbers_of<double>(tilts_deg);
+TiltSeries series_of(const Array<float>& images, const Array<double>& tilts) {
   require_dimensions(images, 3, "a tilt series is an array [view, y, x]");
   require_dimensions(tilts, 1, "tilt angles are an array");
   return TiltSeries::from_images({.values = values_of(images),
@@ -303,8 +239,8 @@ py::tuple read_volume(const std::filesystem::path& path) {
   return to_tuple(std::move(volume));
 }
 
-void write_volume(const py::object& volume, double voxel_size_A, const std::filesystem::path& path,
-                  bool overwrite) {
+void write_volume(const Array<float>& volume, double voxel_size_A,
+                  const std::filesystem::path& path, bool overwrite) {
   const Tomogram tomogram = to_tomogram(volume, voxel_size_A);
   const Unlocked unlocked;
   write_mrc(tomogram, path, overwrite);
@@ -319,8 +255,7 @@ py::array_t<float> sample(const Model& model, const SampleBox& box) {
   return to_volume(std::move(values), box.size);
 }
 
-py::array_t<float> sample_points(const Model& model, const py::object& rows) {
-  const Array<double> points = numbers_of<double>(rows);
+py::array_t<float> sample_points(const Model& model, const Array<double>& points) {
   if (points.ndim() != 2 || points.shape(1) != 3)
     throw Error("points are an array of N rows with x, y and z");
   constexpr py::ssize_t kRowsAtOnce = py::ssize_t{1} << 20;
@@ -378,7 +313,8 @@ void add_reconstruct(py::module_& module) {
                     const Unlocked unlocked;
                     return TiltSeries::from_files(choices.files);
                   })
-      .def_static("from_images", &series_of);
+      .def_static("from_images", &series_of, py::arg("views").noconvert(),
+                  py::arg("tilts_deg").noconvert());
   py::class_<Progress>(module, "Progress", "How far a reconstruction is.")
       .def_readonly("fraction_done", &Progress::fraction_done, "from 0 to 1")
       .def_readonly("seconds_elapsed", &Progress::seconds_elapsed)
@@ -422,12 +358,13 @@ void add_model(py::module_& module) {
       .def("pixel_size_A", &Model::pixel_size_A)
       .def("region", &Model::region)
       .def("sample", &sample)
-      .def("sample_points", &sample_points);
+      .def("sample_points", &sample_points, py::arg("rows").noconvert());
   module.def("found_levelling", &level_found);
   module.def("export_box", &export_box);
   module.def("export_particles", &cut_particles);
   module.def("read_mrc", &read_volume);
-  module.def("write_mrc", &write_volume);
+  module.def("write_mrc", &write_volume, py::arg("volume").noconvert(), py::arg("voxel_size_A"),
+             py::arg("path"), py::arg("overwrite"));
 }
 
 std::optional<double> resolution_at(const ShellCorrelation& curve, const py::object& threshold) {
@@ -454,18 +391,23 @@ void add_evaluate(py::module_& module) {
       .def_readonly("voxels", &ShellCorrelation::voxels)
       .def("resolution_A", &resolution_at, py::arg("threshold") = 0.143,
            "Return where the correlation first falls below a threshold, in Å, or None.");
-  module.def("score_volume", [](const py::object& volume, const py::object& truth) {
-    const Tomogram a = to_tomogram(volume, 1.0), b = to_tomogram(truth, 1.0);
-    const Unlocked unlocked;
-    return score_volume(a, b);
-  });
-  module.def("correlate_shells",
-             [](const py::object& first, const py::object& second, double voxel_size_A) {
-               const Tomogram a = to_tomogram(first, voxel_size_A);
-               const Tomogram b = to_tomogram(second, voxel_size_A);
-               const Unlocked unlocked;
-               return correlate_shells(a, b);
-             });
+  module.def(
+      "score_volume",
+      [](const Array<float>& volume, const Array<float>& truth) {
+        const Tomogram a = to_tomogram(volume, 1.0), b = to_tomogram(truth, 1.0);
+        const Unlocked unlocked;
+        return score_volume(a, b);
+      },
+      py::arg("volume").noconvert(), py::arg("truth").noconvert());
+  module.def(
+      "correlate_shells",
+      [](const Array<float>& first, const Array<float>& second, double voxel_size_A) {
+        const Tomogram a = to_tomogram(first, voxel_size_A);
+        const Tomogram b = to_tomogram(second, voxel_size_A);
+        const Unlocked unlocked;
+        return correlate_shells(a, b);
+      },
+      py::arg("first").noconvert(), py::arg("second").noconvert(), py::arg("voxel_size_A"));
 }
 
 }  // namespace

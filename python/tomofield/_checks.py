@@ -4,8 +4,8 @@ import functools
 import itertools
 import os
 import sys
-from typing import (Any, Callable, Dict, Iterator, List, Literal, Mapping, Sequence, Tuple, Union,
-                    get_args, get_origin, get_type_hints)
+from typing import (Any, Callable, Dict, Iterator, List, Literal, Mapping, Sequence, Tuple, Type,
+                    Union, get_args, get_origin, get_type_hints)
 
 import numpy as np
 
@@ -90,19 +90,27 @@ def text_of(value: object, what: str) -> str:
     return value
 
 
-def array_of(value: Any) -> Any:
-    """Return what numpy makes an array of, for the compiled part, which refuses masks: numpy would
-    drop those of an object's array and of the parts of a sequence."""
+def array_of(value: Any, numbers: Type[Any] = np.float32) -> Any:
+    """Return an array of real numbers of one type, as the compiled part reads them from memory. All
+    arrays of users pass here: numpy would drop imaginary parts, and masks also of an object's array
+    and of the parts of a sequence, and read texts and dates as numbers."""
     if is_masked(value):
-        return np.ma.masked
-    return _array(value) if hasattr(value, "__array__") else value
+        raise Error("an array with masked elements says nothing in their places: fill them "
+                    "(numpy.ma.filled), or leave them out")
+    array = (_array(value) if hasattr(value, "__array__")
+             else _made("an array of numbers is needed", np.asarray, value))
+    if array.dtype.kind not in "biuf":
+        raise Error(f"an array of real numbers is needed, not one of type {array.dtype}")
+    with np.errstate(over="raise"):
+        return _made(f"an array of type {array.dtype} has numbers that are too large",
+                     np.require, array, numbers, ("C", "A", "E"))
 
 
 def places_of(value: Any, what: str) -> Any:
     """Return an array of angles or positions, which are numbers alone."""
     if any(leaf.dtype.kind == "b" for leaf in _leaves(value)):
         raise Error(f"{what} are numbers, not True or False")
-    return array_of(value)
+    return array_of(value, np.float64)
 
 
 def is_masked(value: Any) -> bool:
@@ -156,6 +164,18 @@ def _array(value: object) -> Any:
         return np.asanyarray(value)
     except Exception:  # of any object's own method
         return np.empty(0, object)
+
+
+def _made(otherwise: str, make: Callable[..., Any], *arguments: Any) -> Any:
+    """Return the array that a function of numpy makes. If that raises, `otherwise` says what is
+    wrong: numpy may also be told to refuse numbers (np.seterr, python -W error)."""
+    try:
+        return make(*arguments)
+    except MemoryError as error:
+        raise Error("there is too little memory for a copy of an array that is computed with: "
+                    f"{error}") from None
+    except Exception:
+        raise Error(otherwise) from None
 
 
 def _leaves(value: object) -> Iterator[Any]:

@@ -363,6 +363,7 @@ builtins.last = Last()
     "tomofield.reconstruct(views, tilts, epochs=1000, thickness=16, contrast='bright', "
     "pixel_size_A=10, density_variation=1.0, prior='tv')",
     "[tomofield.score_volume(views, views) for _ in iter(int, 1)]",
+    "[tomofield.score_volume(wide, wide) for _ in iter(int, 1)]",  # most of it converts the arrays
     "model.sample(tomofield.Box((16, 16, 8), (700, 700, 700), euler_deg=(10, 20, 30)))"])
 def test_the_interpreter_ends_in_order_beside_a_daemon_thread(series, work):
     script = f"""
@@ -371,6 +372,7 @@ import numpy as np
 import tomofield
 views = np.random.default_rng(1).normal(100, 10, (21, 32, 32)).astype(np.float32)
 tilts = np.linspace(-60, 60, 21)
+wide = np.broadcast_to(np.linspace(0, 1, 400, dtype=np.longdouble), (300, 400, 400))
 model = tomofield.Model({str(series.folder / "tomogram.h5")!r})
 begun = threading.Event()
 def work():
