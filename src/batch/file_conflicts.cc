@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <map>
+#include <set>
 #include <string>
 #include <system_error>
 
@@ -50,6 +51,22 @@ class Writers {
     }
   }
 
+  // A name cannot be a file and a folder with another file in it.
+  void require_no_folders() {
+    std::set<fs::path> seen;
+    for (const auto& [identity, inner] : writers_) {
+      for (fs::path folder = fs::absolute(inner.file).lexically_normal().parent_path();
+           seen.insert(folder).second; folder = folder.parent_path()) {
+        const auto found = writers_.find(io::identity_of(folder));
+        if (found == writers_.end()) continue;
+        faults_.add(fmt::format(
+            "{} would write '{}', and {} needs a folder of this name: give one another name or "
+            "output",
+            found->second.writer, found->second.file.string(), inner.writer));
+      }
+    }
+  }
+
   void require_none_reads(const std::string& reader, const std::vector<fs::path>& files) {
     for (const fs::path& file : files) {
       const auto found = writers_.find(io::identity_of(file));
@@ -85,6 +102,7 @@ void check_files(const fs::path& folder, const fs::path& list, const std::vector
   require_no_folders(own, faults);
   writers.add("the batch itself", own);
   for (const Job& job : jobs) writers.add(name_of(job), results_of(job));
+  writers.require_no_folders();
   writers.require_none_reads("the list of the series", {list});
   writers.require_none_reads("the command line", io::added_inputs());
   for (const Job& job : jobs) writers.require_none_reads(name_of(job), job.files.inputs);

@@ -43,6 +43,7 @@ struct Job {
   Needs needs;
   bool is_skipped = false;  ///< its results were there before
   JobFiles files;           ///< those of its plan; a list of jobs does not have them
+  bool is_joined = false;   ///< its row for RELION goes to the table of the batch
 };
 
 /// All jobs of a batch, in the order of its series.

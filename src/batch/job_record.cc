@@ -46,6 +46,7 @@ json job_json(const Job& job) {
           {"output", checked_text(job.output.string())},
           {"command", words},
           {"skipped", job.is_skipped},
+          {"joined", job.is_joined},
           {"memory_bytes_of_one_thread", needs.memory_bytes_of_one_thread},
           {"memory_bytes_a_thread", needs.memory_bytes_a_thread},
           {"core_seconds", needs.core_seconds ? json(*needs.core_seconds) : json(nullptr)},
@@ -81,7 +82,8 @@ Job job_from(const json& object) {
                     .open_prior = object.at("open_prior").get<bool>(),
                     .num_trials = trials_at(object)},
           .is_skipped = object.at("skipped").get<bool>(),
-          .files = {}};
+          .files = {},
+          .is_joined = object.at("joined").get<bool>()};
 }
 
 }  // namespace

@@ -49,18 +49,18 @@ bool is_choice(const fs::path& folder) {
 
 std::vector<OwnFile> own_files(const fs::path& folder, const std::vector<Job>& jobs) {
   const std::set<std::string> earlier = earlier_series(folder);
-  // Every batch has the first three, and one of them may be damaged.
+  // Every batch has its list and its summary, and one of them may be damaged.
   const auto of_batch = [folder, has_list = !earlier.empty()] {
     return has_list || has_summary(folder);
   };
   std::vector<OwnFile> files{{list_of(folder), of_batch},
-                             {summary_table(folder), of_batch},
+                             {summary_table(folder), [folder] { return has_summary(folder); }},
                              {summary_page(folder), of_batch},
                              {answer_of(folder, std::nullopt), of_batch},
                              {answer_of(folder, kChoosingTask), of_batch},
                              {choice_file(folder), [folder] { return is_choice(folder); }},
                              {script_of(folder), [folder] { return has_script(folder); }}};
-  if (std::ranges::any_of(jobs, [](const Job& job) { return !job.files.relion_tomogram.empty(); }))
+  if (std::ranges::any_of(jobs, &Job::is_joined))
     files.push_back({relion_table(folder), [folder] { return has_relion_table(folder); }});
   for (const Job& job : jobs) {
     const auto of_series = [folder, &job, is_earlier = earlier.contains(job.name)] {

@@ -1,12 +1,14 @@
 #include "batch/planning.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <map>
 #include <string>
 #include <utility>
 
+#include "base/log.h"
 #include "base/system/child_process.h"
 #include "batch/file_conflicts.h"
 #include "batch/placeholders.h"
@@ -61,6 +63,15 @@ class Stacks {
   std::map<std::string, std::string> sources_;  // by stack
 };
 
+// Names finished tomograms of RELION that were made without its table, or whose rows are lost.
+void warn_of_missing_rows(const std::vector<std::string>& names) {
+  if (names.empty()) return;
+  base::log_warning(
+      fmt::format("the finished results of {} have no row for RELION beside them, so that the "
+                  "tomograms.star of the batch leaves them out: --overwrite makes them again",
+                  fmt::join(names, ", ")));
+}
+
 }  // namespace
 
 fs::path output_of(const Series& series, const fs::path& folder) {
@@ -109,6 +120,7 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
   const fs::path plan = scratch.plan(), log = scratch.log();
   base::Faults faults;
   Stacks stacks;
+  std::vector<std::string> without_row;
   JobList list{.jobs = {}, .overwrites = options.overwrites};
   for (const Series& series : all) {
     Job job{.name = series.name,
@@ -119,6 +131,7 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
             .files = {.inputs = {series.input}, .results = {}, .relion_tomogram = {}}};
     if (job.is_skipped) {
       job.files.relion_tomogram = tomogram_of_result(job);
+      if (series.is_tomogram && job.files.relion_tomogram.empty()) without_row.push_back(job.name);
       if (const std::string fault = fault_of_results(series.output); !fault.empty())
         faults.add(fmt::format("{}: {}: {}", series.source, fault, advice_on_files(series.output)));
     } else {
@@ -138,9 +151,10 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
     }
     list.jobs.push_back(std::move(job));
   }
+  join_rows(list.jobs);
   check_files(options.folder, options.list, list.jobs, faults);
   require_none(faults);
-  warn_of_equal_tomograms(list.jobs);
+  warn_of_missing_rows(without_row);
   return list;
 }
 

@@ -3,14 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "base/log.h"
 #include "exchange/relion_output.h"
-#include "io/is_file.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_set.h"
 #include "io/tables/star_file.h"
@@ -23,7 +25,8 @@ namespace {
 
 constexpr const char* kName = "rlnTomoName";
 constexpr const char* kTomogram = "rlnTomoReconstructedTomogram";
-constexpr const char* kDenoised = "rlnTomoReconstructedTomogramDenoised";
+// The first line of the table, which tells it from those of others.
+constexpr std::string_view kMark = "# tomograms of a batch of tomofield\n";
 
 // Adds the one row of a table to another table, whose columns may differ.
 void add_row(const io::StarTable& row, io::StarTable& all) {
@@ -35,75 +38,79 @@ void add_row(const io::StarTable& row, io::StarTable& all) {
     if (!all.has_column(column)) all.set(all.num_rows() - 1, column, *row.find(0, column));
 }
 
-// Returns the rows beside the results of jobs as one table, or nothing if there are none, or two of
-// the same name.
+// Returns the rows beside the results of jobs as one table, or nothing if there are none.
 std::optional<io::StarTable> rows_of(const std::vector<Job>& jobs) {
   std::optional<io::StarTable> all;
-  std::set<std::string> names;
   for (const Job& job : jobs) {
-    const auto row = exchange::read_relion_output(job.output);
-    if (!row) continue;
-    if (!names.insert(row->find(0, kName).value_or("")).second) return std::nullopt;
-    if (all)
+    const auto row = job.is_joined ? exchange::read_relion_output(job.output) : std::nullopt;
+    if (row && all)
       add_row(*row, *all);
-    else
+    else if (row)
       all = row;
   }
   return all;
 }
 
-// Returns the names of the files of the volumes in a table of a batch, or none for any other file.
+// Returns the names of the files of the volumes in the table of a batch.
 std::set<std::string> volumes_of(const fs::path& file) {
   std::set<std::string> volumes;
-  if (!io::is_file(file)) return volumes;
   try {
-    const std::vector<io::StarTable> tables = io::read_star_file(file);
-    if (tables.size() != 1) return {};
-    const io::StarTable& table = tables.front();
-    for (std::size_t row = 0; row < table.num_rows(); ++row) {
-      const auto volume = table.find(row, kTomogram);
-      if (!volume || table.find(row, kDenoised) != volume) return {};
-      volumes.insert(fs::path(*volume).filename());
-    }
-    return volumes;
+    for (const io::StarTable& table : io::read_star_file(file))
+      for (std::size_t row = 0; row < table.num_rows(); ++row)
+        volumes.insert(fs::path(table.find(row, kTomogram).value_or("")).filename());
   } catch (const Error&) {
-    return {};
+    // There is none, or it is damaged.
   }
+  return volumes;
+}
+
+// Returns what `reconstruct` takes of a job: RELION's table, or the folder that has it.
+fs::path input_of(const Job& job) {
+  return job.command.size() < 2 ? fs::path() : fs::absolute(job.command[1]).lexically_normal();
 }
 
 }  // namespace
 
 fs::path relion_table(const fs::path& folder) { return folder / "tomograms.star"; }
 
-bool has_relion_table(const fs::path& folder) { return !volumes_of(relion_table(folder)).empty(); }
+bool has_relion_table(const fs::path& folder) {
+  std::string line(kMark.size(), '\0');
+  std::ifstream file(relion_table(folder));
+  return file.read(line.data(), std::ssize(line)) && line == kMark;
+}
 
 std::string tomogram_of_result(const Job& job) {
   const auto row = exchange::read_relion_output(job.output);
   return row ? row->find(0, kName).value_or("") : "";
 }
 
-void warn_of_equal_tomograms(const std::vector<Job>& jobs) {
+void join_rows(std::vector<Job>& jobs) {
+  std::vector<Job*> with_row;
+  for (Job& job : jobs)
+    if (!job.files.relion_tomogram.empty()) with_row.push_back(&job);
   std::map<std::string, const Job*> named;
-  for (const Job& job : jobs) {
-    const std::string& name = job.files.relion_tomogram;
-    if (name.empty()) continue;
-    const auto [first, is_new] = named.emplace(name, &job);
-    if (is_new) continue;
-    base::log_warning(
-        fmt::format("the series '{}' and '{}' are both called '{}' in their tables of RELION, "
-                    "which needs names that differ: no tomograms.star of all series is written",
-                    first->second->name, job.name, name));
-    return;
+  for (const Job* const job : with_row) {
+    const auto [first, is_new] = named.emplace(job->files.relion_tomogram, job);
+    const bool is_of_other_table = input_of(*job) != input_of(*with_row.front());
+    if (is_new && !is_of_other_table) continue;
+    const Job& other = is_of_other_table ? *with_row.front() : *first->second;
+    return base::log_warning(fmt::format(
+        "the series '{}' and '{}' are {} of RELION, so no tomograms.star of all series is written: "
+        "each has its own beside its tomogram",
+        other.name, job->name,
+        is_of_other_table ? "of two tables" : "both the tomogram '" + first->first + "'"));
   }
+  for (Job* const job : with_row) job->is_joined = true;
 }
 
 void write_relion_table(const fs::path& folder, const std::vector<Job>& all,
                         const std::vector<Job>& finished) {
   const fs::path file = relion_table(folder);
   if (const auto rows = rows_of(finished)) {
-    io::write_text_file(file, io::star_file_text(*rows));
+    io::write_text_file(file, std::string(kMark) + io::star_file_text(*rows));
     return;
   }
+  if (!has_relion_table(folder)) return;
   const std::set<std::string> volumes = volumes_of(file);
   const bool is_old = std::ranges::any_of(
       all, [&](const Job& job) { return volumes.contains(job.output.filename()); });

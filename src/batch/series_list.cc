@@ -14,6 +14,7 @@
 #include "base/utf8.h"
 #include "batch/csv.h"
 #include "batch/placeholders.h"
+#include "batch/relion_table.h"
 #include "io/tables/relion_star.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -185,20 +186,32 @@ Series read_row(const fs::path& path, const CsvRecord& record, const std::vector
   return series;
 }
 
-// Puts the names of folders before names that several series have.
+// Puts the names of folders before names that several series have, from the inner to the outer
+// ones, and before the name of the table for RELION.
 void tell_apart(std::vector<Series>& all) {
-  std::map<std::string, int> counts;
-  for (const Series& series : all) ++counts[series.name];
-  for (Series& series : all) {
-    const std::string folder = fs::absolute(series.input).parent_path().filename().string();
-    if (counts[series.name] > 1) series.name = folder + "_" + series.name;
+  std::vector<fs::path> paths;
+  for (const Series& series : all) {
+    const fs::path path = fs::absolute(series.input).lexically_normal();
+    paths.push_back(path.has_filename() ? path : path.parent_path());  // a slash at the end
+  }
+  for (bool has_changed = true; has_changed;) {
+    has_changed = false;
+    std::map<std::string, int> counts{{relion_table({}).stem(), 1}};
+    for (const Series& series : all) ++counts[series.name];
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      paths[i] = paths[i].parent_path();
+      const std::string folder = paths[i].filename();
+      if (counts[all[i].name] < 2 || folder.empty()) continue;
+      all[i].name = folder + "_" + all[i].name;
+      has_changed = true;
+    }
   }
 }
 
 // Returns what names a series.
 const char* advice_on_name(const Series& series) {
   return series.is_tomogram ? "give each tomogram an rlnTomoName of its own that can be a file's"
-                            : "give the table a column 'name'";
+                            : "list the series in a table with a column 'name'";
 }
 
 }  // namespace

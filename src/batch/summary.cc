@@ -84,13 +84,12 @@ std::string verdict_text(const std::string& line) {
   return line.starts_with(kTitle) ? line.substr(kTitle.size()) : line;
 }
 
-constexpr std::string_view kFirstColumns = "name,state,reason,output,";
+constexpr std::string_view kColumns =
+    "name,state,reason,output,wall_seconds,core_seconds,expected_core_seconds,peak_GiB,"
+    "expected_GiB,held_out_error,verdict,warnings\n";
 
 std::string csv_text(const std::vector<Line>& lines) {
-  std::string text(kFirstColumns);
-  text +=
-      "wall_seconds,core_seconds,expected_core_seconds,peak_GiB,expected_GiB,held_out_error,"
-      "verdict,warnings\n";
+  std::string text(kColumns);
   for (const Line& line : lines) {
     const base::Costs& costs = line.state.costs;
     const Needs& needs = line.job->needs;
@@ -219,9 +218,9 @@ io::OutputLock wait_for_lock(const fs::path& file) {
 }  // namespace
 
 bool has_summary(const fs::path& folder) {
-  std::string columns(kFirstColumns.size(), '\0');
+  std::string columns(kColumns.size(), '\0');
   std::ifstream file(summary_table(folder));
-  return file.read(columns.data(), std::ssize(columns)) && columns == kFirstColumns;
+  return file.read(columns.data(), std::ssize(columns)) && columns == kColumns;
 }
 
 fs::path summary_table(const fs::path& folder) { return folder / "summary.csv"; }

@@ -4,6 +4,7 @@
 #include "exchange/alignment_output.h"
 #include "exchange/portal_alignment_record.h"
 #include "exchange/relion_output.h"
+#include "io/tables/star_file.h"
 #include "output/output_paths.h"
 
 namespace tomofield::exchange {
@@ -20,6 +21,10 @@ std::vector<std::filesystem::path> exchange_files(const options::ReconstructOpti
   std::vector<std::filesystem::path> files = volume_descriptions(options);
   for (const auto& file : alignment_results(options)) files.push_back(file);
   return files;
+}
+
+void check_exchange_files(const options::ReconstructOptions& options) {
+  if (relion_output(options)) io::require_star_text(options.run.output.string());
 }
 
 void write_exchange_files(const tilt_series::PlannedSeries& series,

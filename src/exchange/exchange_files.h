@@ -16,6 +16,9 @@ std::vector<std::filesystem::path> volume_descriptions(const options::Reconstruc
 /// the files of its alignment (alignment_results()).
 std::vector<std::filesystem::path> exchange_files(const options::ReconstructOptions& options);
 
+/// Throws Error if a name that they would hold cannot be written.
+void check_exchange_files(const options::ReconstructOptions& options);
+
 /// Writes them. The volume's contents are in the file `volume` (Results, WriteMore).
 void write_exchange_files(const tilt_series::PlannedSeries& series,
                           const options::ReconstructOptions& options,

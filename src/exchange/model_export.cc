@@ -10,6 +10,7 @@
 #include "exchange/particles/particle_list.h"
 #include "io/saving/output_files.h"
 #include "io/saving/output_set.h"
+#include "io/tables/star_file.h"
 #include "output/box_bounds.h"
 #include "output/volume.h"
 #include "output/volume_frame.h"
@@ -50,6 +51,7 @@ std::vector<io::OutputLock> claim_export(const ExportFiles& files, const std::st
       if (files.volume.zarr || files.volume.axes != VolumeAxes::kXyz)
         throw Error(
             "--particles writes an MRC stack in the order of xyz: leave --zarr and --axes out");
+      io::require_star_text(files.output.string());
       results.push_back(particle_star(files.output));
       inputs.push_back(files.particles);
     }

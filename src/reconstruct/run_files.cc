@@ -87,6 +87,7 @@ void check_options(const options::ReconstructOptions& options) {
   base::require_no_faults(options.faults());
   if (options.run.output.empty()) return;
   io::require_volume_name(options.run.output);
+  exchange::check_exchange_files(options);
   const output::OutputPaths paths = output::output_paths(options.run.output);
   const bool may_replace = options.run.overwrite || can_resume(options, paths);
   const std::string advice = advice_on_old_files(options, paths);

@@ -364,20 +364,43 @@ def write_one_tomogram(folder, name):
     return [star.parent, pathlib.Path(folder).name]
 
 
-def test_the_tables_of_relion_in_several_folders_are_joined():
+def test_the_table_for_relion_is_its_own():
+    folder = pathlib.Path(harness.fresh_directory("relion_own"))
+    star = star_projects.write_relion(folder, harness.Series("source"))
+    table = write_table(folder / "list.csv", [["stack", "series", "name"], [star, "TS_01", "a"], [star, "TS_02", "b"]])
+    command = ["batch", table, *QUICK[2:], "-o", folder / "results"]
+    harness.succeed(*command, cwd=folder)
+    joined = folder / "results/tomograms.star"
+    assert [row["rlnTomoName"] for row in star_projects.read_rows(str(joined))] == ["TS_01", "TS_02"]
+    rows = joined.read_text(encoding="utf-8").partition("\n")[2]
+    joined.write_text(rows, encoding="utf-8")  # as another program writes it again
+    said = harness.tomofield(*command, "--overwrite", cwd=folder)
+    assert said.returncode == 2 and "tomograms.star" in said.stderr and "earlier batch" in said.stderr, said.stderr
+    assert joined.read_text(encoding="utf-8") == rows
+
+
+def test_rows_of_several_tables_are_not_joined():
+    """The files of each are named from its own project's folder."""
     folder = pathlib.Path(harness.fresh_directory("relion_folders"))
     rows = [write_one_tomogram(folder / name, name) for name in ("D1", "D2")]
     table = write_table(folder / "list.csv", [["stack", "name"], *rows])
-    harness.succeed("batch", table, *QUICK[2:], "-o", folder / "results", cwd=folder)
-    rows = star_projects.read_rows(str(folder / "results/tomograms.star"))
-    assert [row["rlnTomoName"] for row in rows] == ["D1", "D2"]
-    mine = folder / "results/tomograms.star"
-    mine.write_text("of somebody else", encoding="utf-8")
-    said = harness.tomofield("batch", table, *QUICK[2:], "-o", folder / "results", "--overwrite", cwd=folder)
-    assert said.returncode == 2 and "tomograms.star" in said.stderr and "earlier batch" in said.stderr, said.stderr
-    assert mine.read_text(encoding="utf-8") == "of somebody else"
-    views = harness.succeed("batch", "D1/*/*/tilt_series/*.star", *QUICK, "--dry-run", "-o", "other", cwd=folder)
-    assert "2 of 2 series" in views.stdout, views
+    said = harness.succeed("batch", table, *QUICK[2:], "-o", folder / "results", cwd=folder)
+    assert "of two tables of RELION" in said.stderr, said.stderr
+    assert not (folder / "results/tomograms.star").exists() and (folder / "results/D2.star").exists()
+    for pattern_of_tables, number in (("D1/*/*/tilt_series/*.star", 2), ("D?/*/*/tilt_series/TS_01.star", 2),
+                                      ("D1/*/*/tomograms.star", 1)):
+        plan = harness.succeed("batch", pattern_of_tables, *QUICK, "--dry-run", "-o", "other", cwd=folder)
+        assert f"{number} of {number} series" in plan.stdout, plan
+
+
+def test_finished_tomograms_without_a_row_are_named():
+    folder = pathlib.Path(harness.fresh_directory("relion_rows"))
+    star = star_projects.write_relion(folder, harness.Series("source"))
+    command = ["batch", star, *QUICK[2:], "-o", folder / "results"]
+    harness.succeed(*command)
+    os.remove(folder / "results/TS_02.star")
+    said = harness.succeed(*command, "--skip-existing")
+    assert "results of TS_02 have no row" in said.stderr, said.stderr
 
 
 def test_one_series_of_each_project_can_be_named():
@@ -390,13 +413,39 @@ def test_one_series_of_each_project_can_be_named():
     assert listed.returncode == 2 and "leave --series out" in listed.stderr, listed.stderr
 
 
-def test_two_tomograms_of_one_name_are_not_joined():
+def test_a_tomogram_with_two_rows_is_not_joined():
     folder = pathlib.Path(harness.fresh_directory("relion_names"))
-    rows = [write_one_tomogram(folder / name, "same") for name in ("D1", "D2")]
-    table = write_table(folder / "list.csv", [["stack", "name"], *rows])
+    star = star_projects.write_relion(folder, harness.Series("source"))
+    table = write_table(folder / "list.csv", [["stack", "series", "name", "seed"], [star, "TS_01", "a", 1],
+                                              [star, "TS_01", "b", 2]])
     said = harness.succeed("batch", table, *QUICK[2:], "-o", folder / "results", cwd=folder)
-    assert "'same' in their tables" in said.stderr, said.stderr
+    assert "both the tomogram 'TS_01' of RELION" in said.stderr, said.stderr
     assert not (folder / "results/tomograms.star").exists()
+
+
+def test_an_output_cannot_be_a_folder_of_the_batch(data):
+    folder = harness.fresh_directory("output_folder")
+    for output in ("out/logs", "out/logs/choice"):
+        os.makedirs(os.path.join(folder, os.path.dirname(output)), exist_ok=True)
+        table = write_table(os.path.join(folder, "list.csv"),
+                            [["stack", "tlt", "name", "output"],
+                             *[[os.path.join(data, f"{name}.mrc"), os.path.join(data, f"{name}.tlt"), name, place]
+                               for name, place in (("a", output), ("b", ""))]])
+        said = harness.tomofield("batch", table, *QUICK, "-o", "out", "--dry-run", cwd=folder)
+        assert said.returncode == 2 and "needs a folder of this name" in said.stderr, (output, said)
+
+
+def test_what_no_star_file_can_hold_is_refused_before_the_work():
+    folder = pathlib.Path(harness.fresh_directory("carriage_return"))
+    star = pathlib.Path(star_projects.write_relion(folder, harness.Series("source")))
+    for run in (["reconstruct", star, "--series", "TS_01", "-o", folder / "a\rb.mrc"],
+                ["batch", star, "-o", folder / "a\rb"]):
+        said = harness.tomofield(*run, *QUICK[2:], "--dry-run", cwd=folder)
+        assert said.returncode == 2 and "cannot be written into a STAR file" in said.stderr, said
+    text = star.read_text(encoding="utf-8").replace("'the optics'", "'the\roptics'")
+    star.write_text(text, encoding="utf-8", newline="")
+    said = harness.tomofield("batch", star, *QUICK[2:], "--dry-run", "-o", "out", cwd=folder)
+    assert said.returncode == 2 and "_rlnOpticsGroupName has a carriage return" in said.stderr, said
 
 
 def test_all_mistakes_are_found_before_anything_starts(data):

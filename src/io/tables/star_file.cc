@@ -33,7 +33,12 @@ bool is_reserved(std::string_view value) {
                              [&](std::string_view reserved) { return word.starts_with(reserved); });
 }
 
-std::string quoted_where_needed(const std::string& value) {
+bool fits_a_field(const std::string& value) {
+  return ("\n" + value).find("\n;") == std::string::npos && value.find('\r') == std::string::npos;
+}
+
+// Returns a value in quotes if it needs them, or nothing if no quotes can hold it.
+std::optional<std::string> quoted_where_needed(const std::string& value) {
   if (value.empty()) return "\"\"";
   const bool has_lines = value.find_first_of("\r\n") != std::string::npos;
   const auto needs_quotes = [](unsigned char c) {
@@ -46,9 +51,23 @@ std::string quoted_where_needed(const std::string& value) {
   for (const char quote : {'"', '\''})
     if (!has_lines && value.find(quote) == std::string::npos) return quote + value + quote;
   // A text field: it stands between lines that begin with a semicolon.
-  if (("\n" + value).find("\n;") != std::string::npos || value.find('\r') != std::string::npos)
-    throw Error(fmt::format("{} cannot be written into a STAR file", quote(value)));
-  return "\n;" + value + "\n;\n";
+  return fits_a_field(value) ? std::optional("\n;" + value + "\n;\n") : std::nullopt;
+}
+
+std::string star_text(const std::string& value) {
+  if (const auto text = quoted_where_needed(value)) return *text;
+  throw Error(fmt::format("'{}' cannot be written into a STAR file", quote(value)));
+}
+
+// Refuses what could be read and not be written again: a carriage return within quotes.
+void require_texts(const std::filesystem::path& path, const std::vector<std::string>& columns,
+                   const std::vector<std::string>& row) {
+  for (std::size_t i = 0; i < row.size(); ++i)
+    if (!quoted_where_needed(row[i]))
+      throw Error(
+          fmt::format("'{}': the value '{}' of _{} has a carriage return, which no STAR file "
+                      "can hold: write it without",
+                      path.string(), quote(row[i]), columns[i]));
 }
 
 }  // namespace
@@ -113,9 +132,12 @@ std::vector<StarTable> read_star_file(const std::filesystem::path& path) {
           tables.emplace_back(unescaped_star(parsed.name), std::move(parsed.columns));
       for (auto& row : parsed.rows) {
         for (std::string& cell : row) cell = unescaped_star(cell);
+        require_texts(path, table.columns(), row);
         table.add_row(std::move(row));
       }
     }
+  } catch (const Error&) {
+    throw;
   } catch (const std::runtime_error& error) {
     // gemmi writes "line:NUMBER:COLUMN: what"
     throw Error(
@@ -130,6 +152,8 @@ const StarTable* find_table(const std::vector<StarTable>& tables, std::string_vi
   return found == tables.end() ? nullptr : &*found;
 }
 
+void require_star_text(const std::string& value) { star_text(value); }
+
 std::string star_file_text(const StarTable& table) {
   std::string text = fmt::format("\n# version 50001\n\ndata_{}\n\nloop_\n", table.name());
   int number = 0;
@@ -137,7 +161,7 @@ std::string star_file_text(const StarTable& table) {
     text += fmt::format("_{} #{}\n", column, ++number);
   for (std::size_t row = 0; row < table.num_rows(); ++row) {
     for (const std::string& column : table.columns())
-      text += quoted_where_needed(*table.find(row, column)) + '\t';
+      text += star_text(*table.find(row, column)) + '\t';
     text.back() = '\n';
   }
   return text;

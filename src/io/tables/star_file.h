@@ -41,11 +41,15 @@ class StarTable {
   std::vector<std::string> cells_;  // [row, column]
 };
 
-/// Reads the tables of a STAR file. Throws Error with the line for a file that is none.
+/// Reads the tables of a STAR file. Throws Error with the line for a file that is none, and with
+/// the column for a value that star_file_text() cannot write again.
 std::vector<StarTable> read_star_file(const std::filesystem::path& path);
 
 /// Returns the first table that has a column, or nothing.
 const StarTable* find_table(const std::vector<StarTable>& tables, std::string_view column);
+
+/// Throws Error for a text that no STAR file can hold, even in quotes.
+void require_star_text(const std::string& value);
 
 /// Returns a STAR file with one table, in RELION's form. Values that need it are quoted, so that
 /// read_star_file() finds them as they are. Throws Error for a value that no quotes can hold.
