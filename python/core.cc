@@ -416,6 +416,16 @@ void add_evaluate(py::module_& module) {
 PYBIND11_MODULE(_core, module) {
   using namespace tomofield;
   pybind11::register_exception<Error>(module, "Error", PyExc_RuntimeError);
+  pybind11::register_exception_translator([](std::exception_ptr raised) {
+    try {
+      if (raised) std::rethrow_exception(raised);
+    } catch (const std::filesystem::filesystem_error& error) {
+      const auto type = pybind11::module_::import("tomofield._core").attr("Error");
+      const std::string said =
+          "'" + error.path1().string() + "' cannot be used: " + error.code().message();
+      PyErr_SetString(type.ptr(), said.c_str());
+    }
+  });
   module.attr("Error").attr("__doc__") =
       "A file, an array or an option cannot be used. The sentence says what, where, and what to "
       "do.";

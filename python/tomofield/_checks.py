@@ -101,6 +101,10 @@ def array_of(value: Any, numbers: Type[Any] = np.float32) -> Any:
              else _made("an array of numbers is needed", np.asarray, value))
     if array.dtype.kind not in "biuf":
         raise Error(f"an array of real numbers is needed, not one of type {array.dtype}")
+    if array.size * np.dtype(numbers).itemsize >= 2**63:
+        raise Error(f"there is too little memory for an array of {array.size} numbers")
+    if numbers is np.float32 and array.dtype.kind in "iuf" and array.dtype.itemsize > 2:
+        _made("an array of real numbers is needed", _require_differences, np.asarray(array))
     with np.errstate(over="raise"):
         return _made(f"an array of type {array.dtype} has numbers that are too large",
                      np.require, array, numbers, ("C", "A", "E"))
@@ -166,11 +170,27 @@ def _array(value: object) -> Any:
         return np.empty(0, object)
 
 
+def _require_differences(array: Any) -> None:
+    """Refuse numbers that 32-bit floats would round to steps which are as large as their
+    differences, section by section."""
+    if array.dtype == np.float32 or array.ndim < 2:
+        return
+    with np.errstate(all="ignore"):
+        for section in array:
+            largest, spread = np.abs(section).max(initial=0), float(np.std(section))
+            if 0 < spread < 2 * 2.0**-23 * float(largest):
+                raise Error(f"an array of type {array.dtype} has numbers up to {largest:.3g} that "
+                            f"differ by {spread:.3g}, which is lost in the 32-bit floats that are "
+                            "computed with: subtract their mean")
+
+
 def _made(otherwise: str, make: Callable[..., Any], *arguments: Any) -> Any:
     """Return the array that a function of numpy makes. If that raises, `otherwise` says what is
     wrong: numpy may also be told to refuse numbers (np.seterr, python -W error)."""
     try:
         return make(*arguments)
+    except Error:
+        raise
     except MemoryError as error:
         raise Error("there is too little memory for a copy of an array that is computed with: "
                     f"{error}") from None
@@ -197,12 +217,19 @@ def _is_sequence(value: object) -> bool:
             and not isinstance(value, (str, bytes, bytearray, memoryview)))
 
 
-def _would_be_misread(name: str, value: object) -> bool:
-    """Return True if pybind11 would take True for 1, drop imaginary parts or masks, or count
-    days."""
+def _would_be_misread(name: str, value: Any) -> bool:
+    """Return True if pybind11 would take True for 1, cut a fraction off, drop imaginary parts or
+    masks, read a text as a number, or count days."""
     if isinstance(value, bool):
         return "True or False" not in _kind_of(name)
-    return is_masked(value) or any(leaf.dtype.kind in "bcmM" for leaf in _leaves(value))
+    if is_masked(value) or any(leaf.dtype.kind in "bcmM" for leaf in _leaves(value)):
+        return True
+    types = _number_types(name)
+    if not types or value is None or isinstance(value, str):
+        return False
+    parts = np.ravel(value) if isinstance(value, np.ndarray) else value
+    return not all(_is_number(_scalar(part), types)
+                   for part in (parts if isinstance(parts, (tuple, list, np.ndarray)) else [value]))
 
 
 def _beyond(name: str, value: Any) -> str:
@@ -224,6 +251,15 @@ def _takes(name: str, value: Any) -> bool:
     except TypeError:
         return False
     return True
+
+
+@functools.lru_cache(maxsize=None)
+def _number_types(name: str) -> Tuple[type, ...]:
+    """Return the types of the numbers that an option takes, or none if it takes no numbers."""
+    kind = _kind_of(name)
+    if "a number" in kind:
+        return (int, float, np.integer, np.floating)
+    return (int, np.integer) if "whole number" in kind or any(map(str.isdigit, kind)) else ()
 
 
 @functools.lru_cache(maxsize=None)

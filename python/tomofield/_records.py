@@ -48,7 +48,10 @@ def record_of(text: str) -> Record:
 
 def read_record(path: Path) -> Record:
     """Return the record of a run from its .json file, or from the one beside a tomogram."""
-    file = pathlib.Path(path_of(path, "the record")).with_suffix(".json")
+    given = pathlib.Path(path_of(path, "the record"))
+    if not given.name:
+        raise Error(f"the record is a file, and '{given}' names a folder")
+    file = given.with_suffix(".json")
     try:
         return record_of(file.read_text(encoding="utf-8"))
     except OSError as error:

@@ -68,7 +68,11 @@ void begin_batch(const fs::path& folder, const JobList& list) {
   write_jobs(list_of(folder), list);
   for (const Job& job : list.jobs) {
     State state = read_state(folder, job);
-    state.progress = job.is_skipped ? Progress::kSkipped : Progress::kWaiting;
+    // What a stopped batch had begun to replace goes on from there.
+    const bool goes_on = job.replaces && !list.overwrites && has_begun(state);
+    state.progress = job.is_skipped ? Progress::kSkipped
+                     : goes_on      ? Progress::kStopped
+                                    : Progress::kWaiting;
     state.reason.clear();
     write_state(folder, job, state);
   }

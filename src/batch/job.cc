@@ -85,6 +85,17 @@ std::string reason_in_batch(const std::string& said, const fs::path& output) {
   return fmt::format("{}: {}", said.substr(0, end), advice_on_files(output));
 }
 
+std::optional<fs::file_time_type> last_progress(const fs::path& output) {
+  const output::OutputPaths paths = output::output_paths(output);
+  std::optional<fs::file_time_type> last;
+  for (const fs::path& file : {paths.model, paths.trials}) {
+    std::error_code error;
+    const fs::file_time_type written = fs::last_write_time(file, error);
+    if (!error) last = std::max(last.value_or(written), written);
+  }
+  return last;
+}
+
 bool has_checkpoint(const fs::path& output) {
   const output::OutputPaths paths = output::output_paths(output);
   return fs::exists(paths.model) || fs::exists(paths.trials);

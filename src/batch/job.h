@@ -44,6 +44,7 @@ struct Job {
   bool is_skipped = false;  ///< its results were there before
   JobFiles files;           ///< those of its plan; a list of jobs does not have them
   bool is_joined = false;   ///< its row for RELION goes to the table of the batch
+  bool replaces = false;    ///< results that were there before the batch (--overwrite)
 };
 
 /// All jobs of a batch, in the order of its series.
@@ -75,6 +76,8 @@ std::string advice_on_files(const std::filesystem::path& output);
 /// Returns why a run failed as a batch says it. A run that finds other files in its way advises to
 /// overwrite them or to take another name, which a batch would do for all series.
 std::string reason_in_batch(const std::string& said, const std::filesystem::path& output);
+/// Returns when a checkpoint or the trials were last written, or nothing if there are none.
+std::optional<std::filesystem::file_time_type> last_progress(const std::filesystem::path& output);
 /// Returns whether a fit has begun: there is a checkpoint, or trials of --tune.
 bool has_checkpoint(const std::filesystem::path& output);
 /// Returns whether a run can continue: there is a checkpoint, or an alignment.

@@ -47,6 +47,7 @@ json job_json(const Job& job) {
           {"command", words},
           {"skipped", job.is_skipped},
           {"joined", job.is_joined},
+          {"replaces", job.replaces},
           {"memory_bytes_of_one_thread", needs.memory_bytes_of_one_thread},
           {"memory_bytes_a_thread", needs.memory_bytes_a_thread},
           {"core_seconds", needs.core_seconds ? json(*needs.core_seconds) : json(nullptr)},
@@ -83,7 +84,8 @@ Job job_from(const json& object) {
                     .num_trials = trials_at(object)},
           .is_skipped = object.at("skipped").get<bool>(),
           .files = {},
-          .is_joined = object.at("joined").get<bool>()};
+          .is_joined = object.at("joined").get<bool>(),
+          .replaces = object.at("replaces").get<bool>()};
 }
 
 }  // namespace

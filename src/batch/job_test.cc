@@ -26,7 +26,9 @@ TEST(Jobs, AreReadAsTheyAreWritten) {
                                    .open_spike_rank = false,
                                    .open_prior = true,
                                    .num_trials = 6},
-                         .files = {}},
+                         .files = {},
+                         .is_joined = true,
+                         .replaces = true},
                         {.name = "b",
                          .output = "b.mrc",
                          .command = {},
@@ -48,6 +50,8 @@ TEST(Jobs, AreReadAsTheyAreWritten) {
   EXPECT_TRUE(read.jobs[0].needs.open_prior);
   EXPECT_EQ(read.jobs[0].needs.num_trials, 6);
   EXPECT_FALSE(read.jobs[0].is_skipped);
+  EXPECT_TRUE(read.jobs[0].is_joined && read.jobs[0].replaces);
+  EXPECT_FALSE(read.jobs[1].is_joined || read.jobs[1].replaces);
   EXPECT_TRUE(read.jobs[1].is_skipped);
   EXPECT_FALSE(read.jobs[1].needs.core_seconds.has_value());
   list.jobs[0].command.emplace_back("\xff");

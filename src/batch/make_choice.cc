@@ -22,9 +22,8 @@ Vote let_vote(const RunOptions& options, const Job& job, int threads) {
   const auto [answer, log] = trial_files_of(options.folder, job);
   fs::create_directories(log.parent_path());
   fs::remove(answer);
-  std::vector<std::string> command =
-      command_of(options.program, job, threads,
-                 {.resumes = !options.overwrites, .overwrites = options.overwrites});
+  std::vector<std::string> command = command_of(
+      options.program, job, threads, {.resumes = !job.replaces, .overwrites = job.replaces});
   command.push_back("--choice=" + answer.string());
   const base::ChildResult result = base::run_child(command, log, options.stop_requested);
   if (result.exit_status == 0) return vote_of(job, tune::read_choice(answer));

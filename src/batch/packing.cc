@@ -54,8 +54,8 @@ std::vector<Start> choose_starts(const std::vector<Job>& jobs, std::span<const s
   return {};
 }
 
-double seconds_of_all(const std::vector<Job>& jobs, std::vector<std::size_t> waiting,
-                      const Room& room) {
+std::optional<double> seconds_of_all(const std::vector<Job>& jobs, std::vector<std::size_t> waiting,
+                                     const Room& room) {
   struct Running {
     double end;
     Start start;
@@ -63,14 +63,15 @@ double seconds_of_all(const std::vector<Job>& jobs, std::vector<std::size_t> wai
   const auto memory = [&](const Start& start) {
     return jobs[start.job].needs.memory_bytes(start.threads);
   };
+  if (std::ranges::any_of(waiting, [&](std::size_t job) { return !jobs[job].needs.core_seconds; }))
+    return std::nullopt;
   std::vector<Running> running;
   Room free = room;
   double now = 0;
   while (!waiting.empty() || !running.empty()) {
     for (const Start& start : choose_starts(jobs, waiting, free, running.empty())) {
       std::erase(waiting, start.job);
-      running.push_back(
-          {now + jobs[start.job].needs.core_seconds.value_or(0) / start.threads, start});
+      running.push_back({now + *jobs[start.job].needs.core_seconds / start.threads, start});
       free = {free.threads - start.threads, free.memory_bytes - memory(start), free.jobs - 1};
     }
     const auto next = std::ranges::min_element(running, {}, &Running::end);

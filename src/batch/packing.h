@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -34,8 +35,8 @@ std::vector<Start> choose_starts(const std::vector<Job>& jobs, std::span<const s
                                  const Room& room, bool nothing_runs);
 
 /// Estimates how long all waiting jobs take by the clock, if each takes its processor time divided
-/// by its threads. Jobs whose time is not known count as none.
-double seconds_of_all(const std::vector<Job>& jobs, std::vector<std::size_t> waiting,
-                      const Room& room);
+/// by its threads. Returns nothing if the time of one is not known.
+std::optional<double> seconds_of_all(const std::vector<Job>& jobs, std::vector<std::size_t> waiting,
+                                     const Room& room);
 
 }  // namespace tomofield::batch

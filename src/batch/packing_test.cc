@@ -65,10 +65,14 @@ TEST(Packing, OneStartsIfNothingRuns) {
 TEST(Packing, TheTimeOfAllFollowsFromThePacking) {
   const std::vector<Job> jobs{job(8, 1), job(4, 1), job(4, 1)};
   const auto all = largest_first(jobs);
-  EXPECT_DOUBLE_EQ(seconds_of_all(jobs, all, {2, 100 * kGibibyte, 10}), 8);
-  EXPECT_DOUBLE_EQ(seconds_of_all(jobs, all, {2, kGibibyte, 10}), 8);  // one after another on both
-  EXPECT_DOUBLE_EQ(seconds_of_all(jobs, all, {1, 100 * kGibibyte, 10}), 16);
+  EXPECT_DOUBLE_EQ(seconds_of_all(jobs, all, {2, 100 * kGibibyte, 10}).value(), 8);
+  EXPECT_DOUBLE_EQ(seconds_of_all(jobs, all, {2, kGibibyte, 10}).value(),
+                   8);  // one after another on both
+  EXPECT_DOUBLE_EQ(seconds_of_all(jobs, all, {1, 100 * kGibibyte, 10}).value(), 16);
   EXPECT_EQ(seconds_of_all(jobs, {}, {2, kGibibyte, 10}), 0);
+  std::vector<Job> unknown = jobs;
+  unknown[1].needs.core_seconds.reset();
+  EXPECT_FALSE(seconds_of_all(unknown, all, {2, kGibibyte, 10}).has_value());
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -14,6 +15,9 @@
 #include "batch/placeholders.h"
 #include "batch/relion_table.h"
 #include "batch/series_list.h"
+#include "batch/slurm.h"
+#include "batch/state_record.h"
+#include "io/is_file.h"
 #include "io/saving/output_folder.h"
 
 namespace tomofield::batch {
@@ -37,7 +41,7 @@ std::vector<std::string> plan_command(const PlanOptions& options, const Job& job
                                       const fs::path& plan) {
   std::vector<std::string> words =
       command_of(options.program, job, options.threads,
-                 {.resumes = options.skips_existing, .overwrites = options.overwrites});
+                 {.resumes = options.skips_existing && !job.replaces, .overwrites = job.replaces});
   words.push_back("--plan=" + plan.string());
   return words;
 }
@@ -70,6 +74,22 @@ void warn_of_missing_rows(const std::vector<std::string>& names) {
       fmt::format("the finished results of {} have no row for RELION beside them, so that the "
                   "tomograms.star of the batch leaves them out: --overwrite makes them again",
                   fmt::join(names, ", ")));
+}
+
+// Returns the outputs of a stopped batch with --overwrite that are still those of before it.
+std::set<fs::path> outputs_to_replace(const PlanOptions& options) {
+  std::set<fs::path> outputs;
+  if (!options.skips_existing || !io::is_file(list_of(options.folder))) return outputs;
+  try {
+    for (const Job& job : read_jobs(list_of(options.folder)).jobs) {
+      const Progress progress = read_state(options.folder, job).progress;
+      if (job.replaces && progress != Progress::kDone && progress != Progress::kSkipped)
+        outputs.insert(fs::absolute(job.output).lexically_normal());
+    }
+  } catch (const Error&) {
+    // The list is damaged, or of an earlier version.
+  }
+  return outputs;
 }
 
 }  // namespace
@@ -121,14 +141,17 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
   base::Faults faults;
   Stacks stacks;
   std::vector<std::string> without_row;
+  const std::set<fs::path> to_replace = outputs_to_replace(options);
   JobList list{.jobs = {}, .overwrites = options.overwrites};
   for (const Series& series : all) {
     Job job{.name = series.name,
             .output = series.output,
             .command = command_of(series, options.common),
             .needs = {},
-            .is_skipped = options.skips_existing && has_results(series.output),
             .files = {.inputs = {series.input}, .results = {}, .relion_tomogram = {}}};
+    job.replaces =
+        options.overwrites || to_replace.contains(fs::absolute(job.output).lexically_normal());
+    job.is_skipped = options.skips_existing && !job.replaces && has_results(job.output);
     if (job.is_skipped) {
       job.files.relion_tomogram = tomogram_of_result(job);
       if (series.is_tomogram && job.files.relion_tomogram.empty()) without_row.push_back(job.name);

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "batch/summary.h"
 #include "tomofield/error.h"
@@ -14,24 +17,32 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Returns whether the session that begins continues an earlier one. A checkpoint that a batch with
-// --overwrite finds counts only if a session of that batch has left it.
-bool continues(const RunOptions& options, const Job& job, const State& before) {
-  const bool has_run =
-      before.progress == Progress::kStopped || before.progress == Progress::kRunning;
-  return can_resume(job.output) && (has_run || !options.overwrites);
+std::optional<std::int64_t> checkpoint_time_ns(const Job& job) {
+  const auto written = last_progress(job.output);
+  return written ? std::optional(written->time_since_epoch() / std::chrono::nanoseconds(1))
+                 : std::nullopt;
 }
 
-bool was_stopped(int status) {
-  return status == 128 + SIGTERM || status == 128 + SIGINT;  // with a checkpoint
+// Returns whether the session that begins continues an earlier one. If the job replaces results, a
+// checkpoint counts only if a session of this batch has left it.
+bool continues(const Job& job, const State& before) {
+  return can_resume(job.output) &&
+         (!job.replaces ||
+          (has_begun(before) && checkpoint_time_ns(job) != before.old_checkpoint_ns));
+}
+
+bool was_stopped(int status) {  // with a checkpoint
+  return status == 128 + SIGTERM || status == 128 + SIGINT || status == 128 + SIGHUP;
 }
 
 }  // namespace
 
 RunningJob::Session RunningJob::begin(const RunOptions& options, const Job& job) {
   const State before = read_state(options.folder, job);
-  Session session{.resumes = continues(options, job, before), .state = {}};
+  Session session{.resumes = continues(job, before), .state = {}};
   if (session.resumes) session.state.costs = before.costs;
+  session.state.old_checkpoint_ns =
+      has_begun(before) ? before.old_checkpoint_ns : checkpoint_time_ns(job);
   session.state.progress = Progress::kRunning;
   write_state(options.folder, job, session.state);
   return session;
@@ -43,7 +54,7 @@ RunningJob::RunningJob(const RunOptions& options, const Job& job, int threads)
       threads_(threads),
       session_(begin(options, job)),
       child_(command_of(options.program, job, threads,
-                        {.resumes = session_.resumes, .overwrites = options.overwrites}),
+                        {.resumes = session_.resumes, .overwrites = job.replaces}),
              log_of(options.folder, job)) {}
 
 bool RunningJob::has_ended() {
@@ -63,7 +74,7 @@ bool RunningJob::has_ended() {
   } else {
     state.progress = Progress::kFailed;
     state.reason = base::reason_of_failure(result->exit_status, log_of(options_->folder, *job_));
-    if (!options_->overwrites) state.reason = reason_in_batch(state.reason, job_->output);
+    if (!job_->replaces) state.reason = reason_in_batch(state.reason, job_->output);
   }
   write_state(options_->folder, *job_, state);
   return true;

@@ -16,7 +16,6 @@ namespace tomofield::batch {
 struct RunOptions {
   std::filesystem::path program;  ///< tomofield itself
   std::filesystem::path folder;   ///< of the batch
-  bool overwrites = false;
   std::function<bool()> stop_requested;
   std::function<void(const Job& job, int threads)> job_starts;
   std::function<void(const Job& job, const State& state)> job_ends;

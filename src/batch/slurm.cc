@@ -60,11 +60,20 @@ std::int64_t memory_MiB(const std::vector<Job>& jobs, int threads) {
   return static_cast<std::int64_t>(kMoreMemory * static_cast<double>(most)) / kMebibyte + 256;
 }
 
-double minutes(const std::vector<Job>& jobs, int threads) {
+// Returns the time of the longest job, or nothing if that of one is not known.
+std::optional<double> minutes(const std::vector<Job>& jobs, int threads) {
   double most = 0;
-  for (const Job& job : jobs)
-    most = std::max(most, job.needs.core_seconds.value_or(0) / threads / 60);
+  for (const std::size_t job : largest_first(jobs)) {
+    const auto core_seconds = jobs[job].needs.core_seconds;
+    if (!core_seconds) return std::nullopt;
+    most = std::max(most, *core_seconds / threads / 60);
+  }
   return std::ceil(kLeastMinutes + kMoreTime * most);
+}
+
+bool gives_time(const std::string& option) {
+  return option.starts_with("--time") || option.starts_with("-t") ||
+         option.find(" --time") != std::string::npos || option.find(" -t") != std::string::npos;
 }
 
 // Returns a name in an option of sbatch, which knows no quotes and reads % as a pattern. A line end
@@ -157,7 +166,12 @@ std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jo
   add(Script::made(std::string(kFirstOption)));
   add(Script::format("--cpus-per-task={}", options.threads));
   add(Script::format("--mem={}M", memory_MiB(jobs, options.threads)));
-  add(Script::format("--time={:.0f}", minutes(jobs, options.threads)));
+  if (const auto time = minutes(jobs, options.threads))
+    add(Script::format("--time={:.0f}", *time));
+  else if (std::ranges::none_of(options.more, gives_time))
+    throw Error(
+        "the processor time of a series is not known (--engine ray, or leaves above 256 pixels), "
+        "so give the limit of the tasks: --sbatch '--time=…'");
   for (const std::string& option : options.more) add(line_for_sbatch(option));
   add(Script::format("--array={}", array_of(jobs)));
   add("--ntasks=1");

@@ -30,7 +30,8 @@ struct SlurmOptions {
 };
 
 /// Returns the batch script of a job array with a task for every job that is not skipped. All tasks
-/// get the memory of the largest job, and three times the estimated time of the longest.
+/// get the memory of the largest job, and three times the estimated time of the longest. Throws
+/// Error if that is not known and `more` gives none.
 std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jobs);
 
 /// Returns the file of the script, and the list of jobs that its tasks read.

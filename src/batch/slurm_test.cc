@@ -37,6 +37,18 @@ TEST(SlurmScript, HasATaskForEveryJobAndRoomForTheLargest) {
       << script;
 }
 
+TEST(SlurmScript, NeedsALimitForJobsOfUnknownTime) {
+  std::vector<Job> jobs{job(60, 1000), job(0, 500)};
+  jobs[1].needs.core_seconds.reset();
+  EXPECT_THROW(slurm_script({.program = "p", .folder = "/data", .more = {"--mem=1G"}}, jobs),
+               Error);
+  const std::string script = slurm_script(
+      {.program = "p", .folder = "/data", .more = {"--partition=cpu --time=4:00:00"}}, jobs);
+  EXPECT_EQ(script.find("--time="), script.find("--time=4:00:00")) << script;
+  jobs[1].is_skipped = true;
+  EXPECT_NO_THROW(slurm_script({.program = "p", .folder = "/data", .more = {}}, jobs));
+}
+
 TEST(SlurmScript, NeedsAFolderThatSbatchCanRead) {
   EXPECT_THROW(
       slurm_script({.program = "p", .folder = "/data/my results", .more = {}}, {job(1, 1)}), Error);

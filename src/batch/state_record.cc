@@ -24,6 +24,11 @@ fs::path state_file_of(const fs::path& folder, const Job& job) {
 
 namespace {
 
+std::optional<std::int64_t> time_at(const json& state, const char* key) {
+  if (state.at(key).is_null()) return std::nullopt;
+  return io::integer_at(state, key, INT64_MIN, INT64_MAX);
+}
+
 std::optional<State> find_state(const fs::path& file) {
   try {
     const json state = io::read_json(file);
@@ -34,7 +39,8 @@ std::optional<State> find_state(const fs::path& file) {
         .reason = state.at("reason").get<std::string>(),
         .costs = {.core_seconds = io::number_at(state, "core_seconds", 0, base::kLargestNumber),
                   .wall_seconds = io::number_at(state, "wall_seconds", 0, base::kLargestNumber),
-                  .peak_bytes = io::integer_at(state, "peak_bytes", 0, INT64_MAX)}};
+                  .peak_bytes = io::integer_at(state, "peak_bytes", 0, INT64_MAX)},
+        .old_checkpoint_ns = time_at(state, "old_checkpoint_ns")};
   } catch (const json::exception&) {
     return std::nullopt;
   } catch (const Error&) {
@@ -53,11 +59,13 @@ State read_state(const fs::path& folder, const Job& job) {
 }
 
 void write_state(const fs::path& folder, const Job& job, const State& state) {
+  const auto& old = state.old_checkpoint_ns;
   io::write_json(state_file_of(folder, job), {{"progress", base::name_of(state.progress)},
                                               {"reason", state.reason},
                                               {"core_seconds", state.costs.core_seconds},
                                               {"wall_seconds", state.costs.wall_seconds},
-                                              {"peak_bytes", state.costs.peak_bytes}});
+                                              {"peak_bytes", state.costs.peak_bytes},
+                                              {"old_checkpoint_ns", old ? json(*old) : json()}});
 }
 
 }  // namespace tomofield::batch

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -19,7 +21,15 @@ struct State {
   Progress progress = Progress::kWaiting;
   std::string reason;  ///< why it failed or was stopped
   base::Costs costs;
+  /// When the last checkpoint of earlier runs was written that the first session of this batch
+  /// found, in nanoseconds of the clock of files.
+  std::optional<std::int64_t> old_checkpoint_ns = {};
 };
+
+/// Tells whether a session of the batch has begun a job that is not at its end.
+inline bool has_begun(const State& state) {
+  return state.progress == Progress::kStopped || state.progress == Progress::kRunning;
+}
 
 /// Returns the folder of logs and states, FOLDER/logs.
 std::filesystem::path log_folder(const std::filesystem::path& folder);

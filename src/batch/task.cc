@@ -8,7 +8,6 @@
 #include "base/log.h"
 #include "batch/slurm.h"
 #include "batch/summary.h"
-#include "output/output_paths.h"
 #include "tomofield/error.h"
 
 namespace tomofield::batch {
@@ -27,18 +26,6 @@ std::string memory_fault(const Job& job, int threads) {
       "it needs about {:.1f} GiB of memory on {} threads, and Slurm grants {:.1f} GiB "
       "(SLURM_MEM_PER_NODE): give more with --sbatch '--mem=…'",
       static_cast<double>(needed) / kGibibyte, threads, static_cast<double>(*granted) / kGibibyte);
-}
-
-// Returns when a checkpoint or the trials were last written, or nothing if there are none.
-std::optional<fs::file_time_type> last_progress(const Job& job) {
-  const output::OutputPaths paths = output::output_paths(job.output);
-  std::optional<fs::file_time_type> last;
-  for (const fs::path& file : {paths.model, paths.trials}) {
-    std::error_code error;
-    const fs::file_time_type written = fs::last_write_time(file, error);
-    if (!error) last = std::max(last.value_or(written), written);
-  }
-  return last;
 }
 
 State run_to_the_end(const RunOptions& options, const JobList& list, const Job& job, int threads,
@@ -60,14 +47,14 @@ TaskResult run_task(const RunOptions& options, const JobList& list, int number, 
     throw Error(
         fmt::format("there is no task {}: the batch has {} series", number, list.jobs.size()));
   const Job& job = list.jobs[static_cast<std::size_t>(number - 1)];
-  const auto before = last_progress(job);
+  const auto before = last_progress(job.output);
   TaskResult result;
   if (std::string fault = memory_fault(job, threads); !fault.empty())
     result.state = {.progress = Progress::kFailed, .reason = std::move(fault), .costs = {}};
   else
     result.state = run_to_the_end(options, list, job, threads, time_is_up);
   if (result.state.progress == Progress::kStopped && time_is_up()) {
-    if (last_progress(job) == before) {
+    if (last_progress(job.output) == before) {
       result.state.progress = Progress::kFailed;
       result.state.reason =
           "its time limit came before the first checkpoint: give more with --sbatch '--time=…'";

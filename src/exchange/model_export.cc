@@ -61,6 +61,19 @@ std::vector<io::OutputLock> claim_export(const ExportFiles& files, const std::st
   });
 }
 
+namespace {
+
+// Sizes beyond these are read as none.
+void require_voxel_size(double voxel_A) {
+  if (base::is_plausible_pixel_size(voxel_A)) return;
+  throw Error(
+      fmt::format("voxels of {:.3g} Å cannot be written: give --bin or --voxel-size so that "
+                  "they have from {} to {} Å",
+                  voxel_A, base::kPixelSizes_A.low(), base::kPixelSizes_A.high()));
+}
+
+}  // namespace
+
 OrientedBox box_in_field(const output::Model& model, const ExportPlace& place) {
   const Levelling level = place.level.value_or(Levelling{});
   require_possible(level);
@@ -72,6 +85,7 @@ OrientedBox box_in_field(const output::Model& model, const ExportPlace& place) {
 }
 
 void export_volume(const output::Model& model, const OrientedBox& box, const ExportFiles& files) {
+  require_voxel_size(box.voxel_px * model.pixel_size_A);
   io::OutputSet results;
   output::write_volume(model, files.volume, files.output, {.box = box});
   results.commit();
@@ -83,6 +97,7 @@ CutParticles export_particles(const output::Model& model, const ParticleBoxes& b
   if (boxes.size < 1 || boxes.size > kLargestSide)
     throw Error("--particles needs the side of their boxes in voxels: --box N, from 1 to 4096");
   require_possible(boxes.levelling);
+  require_voxel_size(boxes.voxel_px * model.pixel_size_A);
   ParticleList list = read_particle_list(files.particles, files.model, model, tomogram);
   const std::size_t count = list.particles.size();
   io::OutputSet results;

@@ -34,6 +34,7 @@ struct ReconstructOptions : Options {
   std::vector<geometry::ViewCorrection> corrections = {};
   std::vector<std::int64_t> left_out = {};                   ///< sections, beside views.exclude
   std::optional<alignment::AlignmentRecord> alignment = {};  ///< before the fit, if there was one
+  bool has_output = true;  ///< the name of the output is that of the user, if it is not empty
   base::Stopwatch since_start = {};  ///< runs from run_options() on, before an alignment
 
   /// Returns how the tilt series is read.

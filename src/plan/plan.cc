@@ -20,6 +20,7 @@
 #include "measurement/prepare.h"
 #include "measurement/slab_views.h"
 #include "plan/memory_estimate.h"
+#include "plan/run_estimate.h"
 #include "plan/tile_plan.h"
 #include "tomofield/error.h"
 #include "tune/trial_measurement.h"
@@ -178,7 +179,10 @@ void check_before_alignment(const options::ReconstructOptions& options,
                             const distributed::Communicator& processes) {
   if (options.run.align == Alignment::kOff) return;
   const tilt_series::PlannedSeries series(options.input(), processes);
-  processes.run_collectively([&] { require_possible_run(series, options, processes); });
+  processes.run_collectively([&] {
+    const RunPlan plan = require_possible_run(series, options, processes);
+    if (processes.is_root()) require_disk(plan, options);
+  });
 }
 
 void check_alignment_alone(const options::ReconstructOptions& options) {

@@ -76,7 +76,7 @@ std::vector<std::filesystem::path> optional_pictures(const output::OutputPaths& 
 }  // namespace
 
 std::vector<std::filesystem::path> result_files(const options::ReconstructOptions& options) {
-  if (options.run.output.empty()) return {};
+  if (options.run.output.empty() || !options.has_output) return {};
   const output::OutputPaths paths = output::output_paths(options.run.output);
   std::vector<std::filesystem::path> files = files_of(options, paths);
   if (options.volume.zarr) files.push_back(output::zarr_path(paths.volume));
@@ -85,7 +85,7 @@ std::vector<std::filesystem::path> result_files(const options::ReconstructOption
 
 void check_options(const options::ReconstructOptions& options) {
   base::require_no_faults(options.faults());
-  if (options.run.output.empty()) return;
+  if (options.run.output.empty() || !options.has_output) return;
   io::require_volume_name(options.run.output);
   exchange::check_exchange_files(options);
   const output::OutputPaths paths = output::output_paths(options.run.output);

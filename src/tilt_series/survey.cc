@@ -140,6 +140,7 @@ class Surveyor {
                              &ViewCheck::is_constant, &ViewCheck::has_measurements);
     const io::MrcHeader& header = series_.stack().header();
     processes_.run_collectively([&] {
+      require_plausible_scale(checks, series_.stack().name(), header.nx * header.ny);
       for (std::size_t index = 0; index < num_views(); ++index) {
         const View& view = series_.views()[index];
         const std::string name = fmt::format("section {} (tilt {}°) of '{}'", view.section + 1,

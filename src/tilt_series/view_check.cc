@@ -12,6 +12,10 @@ namespace {
 
 constexpr double kMaxPartNotFinite = 0.01;
 
+double part_not_finite(const ViewCheck& found, std::int64_t num_pixels) {
+  return static_cast<double>(found.num_not_finite) / static_cast<double>(num_pixels);
+}
+
 }  // namespace
 
 bool has_measurements(const MaskedImage& image) {
@@ -22,9 +26,29 @@ ViewCheck check_view(const PixelCensus& census, const MaskedImage& image) {
   return {census.num_not_finite, census.num_bad, census.is_constant, has_measurements(image)};
 }
 
+void require_plausible_scale(std::span<const ViewCheck> found, const std::string& stack,
+                             std::int64_t num_pixels) {
+  const auto is_beyond = [&](const ViewCheck& view) {
+    return part_not_finite(view, num_pixels) > kMaxPartNotFinite;
+  };
+  const char* const advice =
+      "its numbers are in a scale that cannot be used, or it is damaged: multiply the stack by a "
+      "factor";
+  if (std::ranges::all_of(found, &ViewCheck::is_constant))
+    throw Error(
+        fmt::format("in every view of '{}' all pixels have the same value, or they differ by less "
+                    "than {:.0e}: {}",
+                    stack, static_cast<double>(kSmallestDifference), advice));
+  if (std::ranges::all_of(found, is_beyond))
+    throw Error(
+        fmt::format("in every view of '{}' more than 1 % of the pixels are NaN, infinite or beyond "
+                    "±{:.0e}: {}",
+                    stack, static_cast<double>(kLargestPixelValue), advice));
+}
+
 void require_usable(const ViewCheck& found, const std::string& name, std::int64_t section,
                     std::int64_t num_pixels) {
-  const double part = static_cast<double>(found.num_not_finite) / static_cast<double>(num_pixels);
+  const double part = part_not_finite(found, num_pixels);
   if (part > kMaxPartNotFinite) {
     throw Error(
         fmt::format("{} has {} NaN or infinite pixels (or beyond ±{:.0e}), {:.1f} % of all and "

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 
 #include "tilt_series/decode_view.h"
@@ -20,6 +21,10 @@ struct ViewCheck {
 bool has_measurements(const MaskedImage& image);
 
 ViewCheck check_view(const PixelCensus& census, const MaskedImage& image);
+
+/// Throws Error if no view of a stack can be used, as its numbers are in another scale.
+void require_plausible_scale(std::span<const ViewCheck> found, const std::string& stack,
+                             std::int64_t num_pixels);
 
 /// Throws Error if a view cannot be used, and warns of pixels that are NaN or infinite. `name`
 /// names the view, `section` is its number counted from 1, and it has `num_pixels` as recorded.

@@ -435,6 +435,26 @@ def test_an_output_cannot_be_a_folder_of_the_batch(data):
         assert said.returncode == 2 and "needs a folder of this name" in said.stderr, (output, said)
 
 
+def test_a_batch_that_was_stopped_while_it_replaced_results_goes_on_replacing(data):
+    folder = pathlib.Path(harness.fresh_directory("stopped_overwrite"))
+    command = ["batch", os.path.join(data, "[ab].mrc"), *pattern(data)[1:], *QUICK, "--at-once", 1, "--threads", 1,
+               "-o", folder / "out"]
+    harness.succeed(*command)
+    before = {name: options_of(str(folder / "out" / name))["fit"]["seed"] for name in ("a.mrc", "b.mrc")}
+    longer = [*[400 if word == 2 else word for word in command], "--seed", 7]
+    run = harness.start(*longer, "--overwrite")
+    state = folder / "out/logs/a.state.json"
+    while run.poll() is None and '"running"' not in state.read_text(encoding="utf-8"):
+        time.sleep(0.02)
+    run.send_signal(signal.SIGINT)
+    assert run.wait(timeout=60) == 130
+    said = harness.succeed(*longer, "--skip-existing")
+    assert "2 of 2 series" in said.stdout, said
+    for name, seed in before.items():
+        assert seed != 7 and options_of(str(folder / "out" / name))["fit"]["seed"] == 7
+    assert "0 of 2 series" in harness.succeed(*longer, "--skip-existing").stdout
+
+
 def test_what_no_star_file_can_hold_is_refused_before_the_work():
     folder = pathlib.Path(harness.fresh_directory("carriage_return"))
     star = pathlib.Path(star_projects.write_relion(folder, harness.Series("source")))

@@ -2,6 +2,7 @@
 pybind11's or numpy's own."""
 
 import collections
+import fractions
 import pathlib
 import re
 
@@ -132,6 +133,11 @@ SENTENCES = (
     ("or 0 for the default, not 1000000", lambda m: tomofield.set_thread_count(10**6)),
     ("too little memory", lambda m: tomofield.score_volume(  # of 2 EiB, which no machine has
         *2 * [np.broadcast_to(np.float64(1), (1 << 20, 1 << 20, 1 << 19))])),
+    ("too little memory", lambda m: tomofield.score_volume(  # of more bytes than have a number
+        *2 * [np.broadcast_to(np.int8(1), (1 << 21, 1 << 21, 1 << 20))])),
+    ("lost in the 32-bit floats", lambda m: fit(np.random.default_rng(1).normal(1e9, 1, VIEWS.shape))),
+    ("cannot be used: File name too long", lambda m: tomofield.write_mrc("x" * 300, VIEWS, 10)),
+    ("names a folder", lambda m: tomofield.read_record("")),
     (MASKED_ELEMENTS, lambda m: fit(MASKED)),
     (MASKED_ELEMENTS, lambda m: fit(list(MASKED))),
     (MASKED_ELEMENTS, lambda m: fit([VIEWS[0].tolist(), *MASKED[:2]])),
@@ -222,3 +228,12 @@ def test_names_that_share_words_with_an_option_are_alike(name, like):
         tomofield.reconstruct(VIEWS, TILTS, pixel_size_A=1, **{name: 3})
     suggested = "" if like is None else f" (did you mean {like}?)"
     assert str(refused.value) == f"there is no option '{name}'{suggested}"
+
+
+@pytest.mark.parametrize("name, value", [
+    ("epochs", np.float32(2.7)), ("epochs", np.array([2.7])), ("epochs", fractions.Fraction(27, 10)),
+    ("roi", np.array([1.9, 0, 24.9, 24], np.float32)), ("roi", b"\0\0\x18\x18"),
+    ("thickness", np.array("2")), ("defocus_hand", np.float32(1.7))])
+def test_no_fraction_is_cut_off_and_no_text_is_a_number(name, value):
+    with pytest.raises(TypeError, match=f"the option {name} cannot be"):
+        fit(**{name: value})

@@ -24,6 +24,11 @@
 namespace tomofield::base {
 namespace {
 
+bool has_limit_of_time() {
+  rlimit limit{};
+  return getrlimit(RLIMIT_CPU, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+}
+
 double seconds(const timeval& t) {
   return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
 }
@@ -130,7 +135,8 @@ ChildResult run_child(const std::vector<std::string>& command, const std::filesy
 std::string reason_of_failure(int exit_status, const std::filesystem::path& log) {
   constexpr int kSignal = 128;
   if (exit_status == kSignal + SIGKILL)
-    return "it was killed, as the system does when memory runs out";
+    return fmt::format("it was killed, as the system does when memory runs out{}",
+                       has_limit_of_time() ? " or the processor time of ulimit -t is used up" : "");
   const std::string said = reason_of_failure(log);
   if (exit_status > kSignal)
     return fmt::format("signal {} ended it{}", exit_status - kSignal,

@@ -112,11 +112,12 @@ void print_plan(const batch::JobList& list, const batch::Room& room) {
           static_cast<double>(needs.result_bytes) / kGibibyte);
   }
   const std::vector<std::size_t> waiting = largest_first(list.jobs);
+  const std::optional<double> seconds = seconds_of_all(list.jobs, waiting, room);
   print(
-      "{} of {} series to reconstruct, {:.2f} GiB of results; about {} on {} threads if nothing "
-      "else runs\n",
+      "{} of {} series to reconstruct, {:.2f} GiB of results; {} on {} threads if nothing else "
+      "runs\n",
       waiting.size(), list.jobs.size(), static_cast<double>(results) / kGibibyte,
-      base::time_text(seconds_of_all(list.jobs, waiting, room)), room.threads);
+      seconds ? "about " + base::time_text(*seconds) : "an unknown time", room.threads);
   flush_output();
 }
 
@@ -142,10 +143,9 @@ void print_summary(const fs::path& folder) {
         batch::summary_page(folder).string());
 }
 
-batch::RunOptions run_options(const fs::path& folder, bool overwrites) {
+batch::RunOptions run_options(const fs::path& folder) {
   return {.program = base::program_path(),
           .folder = folder,
-          .overwrites = overwrites,
           .stop_requested = stop_was_requested,
           .job_starts =
               [](const batch::Job& job, int threads) {
@@ -170,7 +170,7 @@ void choose_for_all(const batch::RunOptions& options, const std::vector<std::siz
 
 // Runs the jobs on this machine. Throws ExitStatus if some failed or it was stopped.
 void run_here(const fs::path& folder, const batch::JobList& list, const batch::Room& room) {
-  const bool is_finished = run_jobs(run_options(folder, list.overwrites), list.jobs, room);
+  const bool is_finished = run_jobs(run_options(folder), list.jobs, room);
   print_summary(folder);
   if (!is_finished)
     throw ExitStatus(stop_status(), fmt::format("stopped; continue with the same command and "
@@ -213,7 +213,7 @@ void run_by_slurm(const BatchArguments& arguments, const batch::JobList& list,
 void run_task(const CLI::App& command, const BatchArguments& arguments) {
   stop_on_signals(/*is_job=*/true);  // Slurm sends SIGUSR1 before the time limit
   batch::JobList list = batch::read_jobs(arguments.list);
-  const batch::RunOptions options = run_options(arguments.folder, list.overwrites);
+  const batch::RunOptions options = run_options(arguments.folder);
   const int threads = threads_of(command, arguments);
   if (*arguments.task == batch::kChoosingTask) {
     const auto plan = batch::plan_choice(arguments.folder, /*continues=*/false, list.jobs);
@@ -269,8 +269,7 @@ void run(const CLI::App& command, const BatchArguments& arguments,
     batch::forget_choice(options.folder);
   begin_batch(options.folder, list);
   if (arguments.slurm) return run_by_slurm(arguments, list, script, !choice.choosing.empty());
-  choose_for_all(run_options(options.folder, list.overwrites), choice.choosing, options.threads,
-                 list);
+  choose_for_all(run_options(options.folder), choice.choosing, options.threads, list);
   run_here(options.folder, list, room);
 }
 

@@ -28,23 +28,25 @@ struct ReconstructArguments {
   std::optional<std::filesystem::path> batch_choice;
 };
 
-// Gives the tomogram of a dry run a name, which is needed and not written.
-void require_output(RunOptions& run, bool dry_run) {
-  if (!run.output.empty()) return;
+// Gives the tomogram of a dry run without -o a name, of which nothing is written or checked.
+// Returns whether there was a name.
+bool settle_output(RunOptions& run, bool dry_run) {
+  if (!run.output.empty()) return true;
   if (!dry_run)
     throw Error("--output is required: name the tomogram with -o (--dry-run needs none)");
-  run.output = "tomofield_dry_run.mrc";
-  run.overwrite = true;
+  run.output = "tomogram.mrc";
+  return false;
 }
 
 void run(const CLI::App& command, ReconstructArguments& arguments,
          const distributed::Communicator& processes) {
   processes.run_collectively([&] { open_project(command, arguments.choices); });
-  require_output(arguments.choices.options.run, arguments.dry_run.is_wanted);
+  const bool has_output = settle_output(arguments.choices.options.run, arguments.dry_run.is_wanted);
   if (arguments.batch_choice)
     note_choice_of_batch(command, *arguments.batch_choice, arguments.choices);
   options::ReconstructOptions options =
       options::run_options(arguments.choices.files, arguments.choices.options);
+  options.has_output = has_output;
   processes.run_collectively([&] {
     check_extra_files({{arguments.plan, "--plan"},
                        {arguments.choice, "--choice"},

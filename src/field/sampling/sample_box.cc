@@ -36,18 +36,23 @@ std::int64_t sections_at_once(const OrientedBox& box, std::int64_t num_rows) {
   return std::clamp(kPartValues / (num_rows * box.size[0]), std::int64_t{1}, box.size[2]);
 }
 
-// Throws Error if the parts that are sampled at once, with two copies of who writes them, are more
-// than the memory. Usual ones are small.
-void require_memory_of_parts(const OrientedBox& box, base::Range some) {
+// Returns the bytes of the parts that are sampled at once, with two copies of who writes them, or 0
+// for usual ones, which are small.
+std::size_t bytes_of_parts(const OrientedBox& box, base::Range some) {
   constexpr std::int64_t kCopies = 3, kUsual = 2 * kPartValues;
   const std::int64_t rows = std::min<std::int64_t>(kBlock, some.size());
   const std::int64_t values =
       rows * box.size[0] * (box.is_aligned() ? sections_at_once(box, rows) : 1);
-  if (values <= kUsual) return;
+  if (values <= kUsual) return 0;
   const std::int64_t parts = (some.size() + rows - 1) / rows * (box.is_aligned() ? 1 : box.size[2]);
   const std::int64_t at_once = std::min<std::int64_t>(base::thread_count(), parts);
-  base::require_memory(static_cast<std::size_t>(at_once * values * kCopies) * sizeof(float),
-                       fmt::format("sampling rows of {} voxels", box.size[0]).c_str(),
+  return static_cast<std::size_t>(at_once * values * kCopies) * sizeof(float);
+}
+
+void require_memory_of_parts(const OrientedBox& box, base::Range some) {
+  const std::size_t bytes = bytes_of_parts(box, some);
+  if (bytes == 0) return;
+  base::require_memory(bytes, fmt::format("sampling rows of {} voxels", box.size[0]).c_str(),
                        "use fewer threads, or a box that is shorter along x");
 }
 
@@ -202,7 +207,8 @@ std::vector<float> sample_box(const Field& field, const OrientedBox& box) {
 void require_memory_of(const OrientedBox& box) {
   require_feasible(box);
   const auto [nx, ny, nz] = box.size;
-  base::require_memory(static_cast<std::size_t>(nx * ny * nz) * sizeof(float),
+  const std::size_t of_parts = bytes_of_parts(box, {0, static_cast<int>(ny)});
+  base::require_memory(static_cast<std::size_t>(nx * ny * nz) * sizeof(float) + of_parts,
                        fmt::format("a box of {} × {} × {} voxels", nx, ny, nz).c_str(),
                        "sample it in parts");
 }
