@@ -162,32 +162,59 @@ std::optional<double> voltage_of_mdoc(const SeriesFiles& files) {
   return files.mdoc ? io::read_mdoc(*files.mdoc).voltage_kV : std::nullopt;
 }
 
+constexpr double kSameVoltage_kV = 1.0;
+
 // Says so if two files state different voltages, one of which is that of the microscope.
 void warn_of_voltages(double used_kV, const io::CtfTable& ctf) {
-  constexpr double kSame_kV = 1.0;
-  if (!ctf.optics.voltage_kV || std::abs(*ctf.optics.voltage_kV - used_kV) <= kSame_kV) return;
+  if (!ctf.optics.voltage_kV || std::abs(*ctf.optics.voltage_kV - used_kV) <= kSameVoltage_kV)
+    return;
   base::log_warning(fmt::format(
       "'{}' has the defocus for a voltage of {} kV, and {} kV count: give the right one with "
       "--voltage",
       ctf.file.string(), *ctf.optics.voltage_kV, used_kV));
 }
 
+// Says so if the defocus was measured with another pixel size, which makes it wrong by the square.
+// Images are also binned by whole numbers, which changes no defocus.
+void warn_of_pixels(double pixel_size_A, const io::CtfTable& ctf) {
+  constexpr double kCalibration = 0.02;
+  const double stated_A = ctf.optics.pixel_size_A.value_or(0.0);
+  if (stated_A <= 0.0) return;
+  const double ratio = std::max(stated_A, pixel_size_A) / std::min(stated_A, pixel_size_A);
+  if (std::fabs(ratio / std::round(ratio) - 1.0) < kCalibration) return;
+  base::log_warning(fmt::format(
+      "'{}' has the defocus for pixels of {:.6g} Å, and the pixels of the views have {:.6g} Å: a "
+      "defocus that was measured with a wrong size is wrong by its square",
+      ctf.file.string(), stated_A, pixel_size_A));
+}
+
 // Returns the optics: those of the options, else those of the file, else the usual ones. The
 // voltage is also that of an .mdoc.
 microscope::Optics find_optics(const SeriesFiles& files, const ViewOptions& options,
-                               const std::optional<io::CtfTable>& ctf) {
+                               const std::optional<io::CtfTable>& ctf,
+                               const tilt_series::PlannedSeries& series) {
   const io::StatedOptics stated = ctf ? ctf->optics : io::StatedOptics{};
   microscope::Optics optics;
   const auto choose = [](double& value, const std::optional<double>& given,
                          const std::optional<double>& in_file) {
     if (given || in_file) value = given ? *given : *in_file;
   };
-  const std::optional<double> recorded_kV = voltage_of_mdoc(files);
+  const std::optional<double>& in_header_kV = series.stack().header().extended_voltage_kV;
+  const std::optional<double> in_mdoc_kV = voltage_of_mdoc(files);
+  const std::optional<double>& recorded_kV = in_mdoc_kV ? in_mdoc_kV : in_header_kV;
+  const std::string recorded_in =
+      in_mdoc_kV ? files.mdoc->string() : "the header of " + series.stack().name();
+  if (in_mdoc_kV && in_header_kV && std::fabs(*in_mdoc_kV - *in_header_kV) > kSameVoltage_kV)
+    base::log_warning(fmt::format(
+        "'{}' states a voltage of {} kV, and the header of '{}' {} kV: give the right one with "
+        "--voltage",
+        recorded_in, *in_mdoc_kV, series.stack().name(), *in_header_kV));
   choose(optics.voltage_kV, options.voltage_kV, recorded_kV ? recorded_kV : stated.voltage_kV);
   if (!options.voltage_kV && recorded_kV)
-    base::log_info(fmt::format("voltage: {} kV from '{}'", *recorded_kV, files.mdoc->string()));
+    base::log_info(fmt::format("voltage: {} kV from '{}'", *recorded_kV, recorded_in));
   if (!ctf) return microscope::without_phase_contrast(optics);
   warn_of_voltages(optics.voltage_kV, *ctf);
+  warn_of_pixels(series.pixel_size_A() / series.bin_factor(), *ctf);
   choose(optics.spherical_aberration_mm, options.spherical_aberration_mm,
          stated.spherical_aberration_mm);
   choose(optics.amplitude_contrast, options.amplitude_contrast, stated.amplitude_contrast);
@@ -404,7 +431,7 @@ std::vector<microscope::ViewTransfer> view_transfers(const tilt_series::TiltSeri
   const auto exposures = find_exposures(files, options, sections);
   const auto detector = find_detector(files, series);
   if (!ctf && !exposures && !detector) return {};
-  const microscope::Optics optics = find_optics(files, options, ctf);
+  const microscope::Optics optics = find_optics(files, options, ctf, series);
   std::vector<microscope::ViewTransfer> transfers(series.views().size());
   for (std::size_t view = 0; view < transfers.size(); ++view) {
     microscope::ViewTransfer& transfer = transfers[view];

@@ -104,7 +104,7 @@ std::string contradiction_of(const io::Mdoc& mdoc, bool has_doses) {
   std::ranges::sort(order, {}, prior);
   for (std::size_t i = 1; i < order.size(); ++i) {
     const double rise = prior(order[i]) - prior(order[i - 1]);
-    if (rise > 0.0 && rise < *mdoc.sections[order[i - 1]].dose / 2)
+    if (rise < *mdoc.sections[order[i - 1]].dose / 2)
       return "PriorRecordDose rises by less than ExposureDose";
   }
   return "";

@@ -109,6 +109,8 @@ TEST(ExposuresOfMdoc, AreNotThoseOfAPriorDoseThatIsContradicted) {
   EXPECT_EQ(with("1"), "");
   EXPECT_EQ(with("0.3"), "");  // a view was repeated
   EXPECT_EQ(with("3"), "PriorRecordDose rises by less than ExposureDose");
+  constexpr const char* kEqual = "PriorRecordDose = 5\nExposureDose = 3";
+  EXPECT_EQ(fault({kEqual, kEqual, kEqual}), "PriorRecordDose rises by less than ExposureDose");
 }
 
 TEST(ExposuresOfMdoc, NeverContradictAPriorDoseThatIsKnown) {

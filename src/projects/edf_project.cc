@@ -101,6 +101,11 @@ void set_dataset(Project& project, const fs::path& edf, const Entries& entries,
   constexpr const char* kExcluded = "Setup.AxisA.ExcludeProjections";
   if (const std::string excluded = value_of(entries, kExcluded); !excluded.empty())
     project.set("--exclude", excluded, edf, kExcluded);
+  for (const char* entry : {"Setup.DistortionFile", "Setup.MagGradientFile"})
+    if (const std::string file = value_of(entries, entry); !file.empty() && !project.ignores(entry))
+      project.warn(fmt::format(
+          "'{}': {} names '{}', which is not applied (--ignore {} says that this is meant)",
+          edf.string(), entry, io::quote(file), entry));
   set_pixel_size(project, edf, entries, *stack);
   if (const fs::path xtilt = stem.string() + ".xtilt"; is_file(xtilt))
     project.set("--xtilt", xtilt.string(), edf, kEntry);

@@ -228,6 +228,18 @@ ImodImages read_aligned(Project& project, const NamedFile& aligned, CommandEntri
   return images;
 }
 
+// Warns of files that newst.com names and that are not there: others are read.
+void warn_of_absent(Project& project, CommandEntries* newst, const std::string& instead) {
+  if (newst == nullptr) return;
+  for (const char* entry : {"InputFile", "TransformFile"}) {
+    const auto path = newst->path(entry);
+    if (!path || is_file(*path) || project.ignores(entry)) continue;
+    project.warn(fmt::format(
+        "'{}' has {} {}, which is not there: {} is read (--ignore {} says that this is meant)",
+        newst->file().string(), entry, path->filename().string(), instead, entry));
+  }
+}
+
 }  // namespace
 
 ImodImages choose_imod_images(Project& project, CommandEntries& tilt, CommandEntries* newst) {
@@ -237,8 +249,15 @@ ImodImages choose_imod_images(Project& project, CommandEntries& tilt, CommandEnt
   if (!raw && hindrance.empty()) raw = usual_raw_files(project, tilt);
   const auto aligned = find_file(tilt, "InputProjections");
   if (newst != nullptr) newst->know(kHarmless);
-  if (raw) return read_raw(project, *raw, tilt, newst);
+  if (raw) {
+    warn_of_absent(project, newst,
+                   fmt::format("'{}' with '{}'", raw->stack.path.filename().string(),
+                               raw->xf.path.filename().string()));
+    return read_raw(project, *raw, tilt, newst);
+  }
   if (aligned) {
+    warn_of_absent(project, newst,
+                   fmt::format("the aligned stack '{}'", aligned->path.filename().string()));
     if (!hindrance.empty()) {
       project.warn(fmt::format("'{}' has {}, so the aligned stack is read, and not the raw one",
                                newst->file().string(), hindrance));

@@ -198,6 +198,18 @@ TEST(ImodProject, AreTomosLocalFileIsThatOfTheWholeViews) {
   expect_parts(imod.warnings(), {"LOCALFILE", "AreTomo"});
 }
 
+TEST(ImodProject, FilesThatAreNamedAndNotThereAreWarnedOf) {
+  const ImodFolder imod;
+  imod.write_tilt("");
+  imod.folder.write("newst.com",
+                    "$newstack -StandardInput\nInputFile TS.st\nTransformFile other.xf\n");
+  expect_parts(imod.warnings(), {"newst.com", "TransformFile other.xf", "not there"});
+  imod.write_newst("");
+  imod.folder.write("ctfcorrection.com",
+                    "$ctfphaseflip -StandardInput\nDefocusFile other.defocus\n");
+  expect_parts(imod.warnings(), {"ctfcorrection.com", "DefocusFile other.defocus", "not there"});
+}
+
 TEST(ImodProject, ViewsToIncludeLeaveOutTheOthers) {
   const ImodFolder imod;
   imod.write_tilt("INCLUDE 2-3\nINCLUDE 5\n");

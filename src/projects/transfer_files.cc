@@ -85,6 +85,11 @@ struct CtfCommands {
   std::array<const CtfCommand*, 2> all() const { return {&correction, &plotter}; }
 };
 
+// A file with the contrast transfer of the views, and where it is named.
+struct NamedTransfer {
+  fs::path file, named_in;
+};
+
 // A number above 0 that an entry of a command file states.
 struct StatedNumber {
   fs::path file;
@@ -219,13 +224,27 @@ void set_imod_optics(Project& project, const fs::path& tilt_com, const StackPixe
 
 bool set_imod_transfer(Project& project, const fs::path& tilt_com, const std::string& name) {
   const CtfCommands commands(tilt_com);
+  std::optional<NamedTransfer> found;
   for (const CtfCommand* command : commands.all()) {
     for (const io::CommandEntry& entry : command->entries) {
-      const fs::path file = command->file.parent_path() / entry.value;
-      if (lower_case(entry.name) != "defocusfile" || !io::is_file(file)) continue;
-      return set_transfer_file(project, file, command->file);
+      if (lower_case(entry.name) != "defocusfile" || project.ignores(entry.name)) continue;
+      const NamedTransfer named{command->file.parent_path() / entry.value, command->file};
+      if (!io::is_file(named.file))
+        project.warn(
+            fmt::format("'{}' has {} {}, which is not there (--ignore {} says that this is "
+                        "meant)",
+                        command->file.string(), entry.name, io::quote(entry.value), entry.name));
+      else if (!found)
+        found = named;
+      else if (found->file.lexically_normal() != named.file.lexically_normal())
+        project.warn(
+            fmt::format("'{}' names the defocus file '{}', and '{}' another, '{}': the "
+                        "former is read (give the right one with --ctf)",
+                        found->named_in.string(), found->file.string(), named.named_in.string(),
+                        named.file.string()));
     }
   }
+  if (found) return set_transfer_file(project, found->file, found->named_in);
   return set_transfer_files(project, tilt_com.parent_path(), name);
 }
 

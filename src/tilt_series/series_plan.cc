@@ -190,6 +190,14 @@ void require_square_pixels(const io::ImageStack& stack) {
                   std::min(width_A, height_A) == 0.0 ? " (0: none, or one that cannot be)" : ""));
 }
 
+void require_whole_images(const io::ImageStack& stack) {
+  if (!stack.header().has_pieces) return;
+  throw Error(fmt::format(
+      "the extended header of '{}' places several sections at one Z: a montage of pieces is not "
+      "read: blend them into one image a view (in eTomo or with blendmont)",
+      stack.name()));
+}
+
 void warn_of_sections_beyond(const TiltSeriesOptions& options, const io::ImageStack& stack) {
   const auto facts = facts_of(options, stack);
   if (!facts || facts->sections_beyond == 0) return;
@@ -375,6 +383,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
         "'{}' is a stack of volumes (space group 401), and no tilt series: give the stack",
         stack.name()));
   }
+  require_whole_images(stack);
   const auto mdoc = options.mdoc ? std::optional(io::read_mdoc(*options.mdoc)) : std::nullopt;
   SeriesPlan plan;
   plan.pixel_size_A = find_pixel_size(options, stack, mdoc);

@@ -34,16 +34,16 @@ void require_plausible_scale(std::span<const ViewCheck> found, const std::string
   const char* const advice =
       "its numbers are in a scale that cannot be used, or it is damaged: multiply the stack by a "
       "factor";
-  if (std::ranges::all_of(found, &ViewCheck::is_constant))
-    throw Error(
-        fmt::format("in every view of '{}' all pixels have the same value, or they differ by less "
-                    "than {:.0e}: {}",
-                    stack, static_cast<double>(kSmallestDifference), advice));
   if (std::ranges::all_of(found, is_beyond))
     throw Error(
         fmt::format("in every view of '{}' more than 1 % of the pixels are NaN, infinite or beyond "
                     "±{:.0e}: {}",
                     stack, static_cast<double>(kLargestPixelValue), advice));
+  if (std::ranges::all_of(found, &ViewCheck::is_constant))
+    throw Error(
+        fmt::format("in every view of '{}' all pixels have the same value, or they differ by less "
+                    "than {:.0e}: {}",
+                    stack, static_cast<double>(kSmallestDifference), advice));
 }
 
 void require_usable(const ViewCheck& found, const std::string& name, std::int64_t section,

@@ -209,7 +209,9 @@ def test_pixels_that_are_no_measurements(good, out, refuse_series, stack, stack_
     harness.succeed("reconstruct", name, "-o", out, *good, "--dry-run", "--exclude", 3)
     for scale in (1e-30, 1e-42):
         tiny = stack_file("tiny.mrc", views * np.float32(scale))
-        refuse_series([tiny, "section 1", "constant"], tiny)
+        refuse_series([tiny, "in every view", "same value"], tiny)
+    huge = stack_file("huge.mrc", views * np.float32(1e16))
+    refuse_series([huge, "in every view", "beyond"], huge)
     for factor in (1e30, 1e16):
         values = views.copy()
         values[4] *= np.float32(factor)
@@ -426,7 +428,7 @@ def test_a_stack_of_nothing_is_answered_in_little_memory(out, path, stack, text_
     angles = text_file("all.tlt", "".join(f"{tilt}\n" for tilt in range(-60, 61, 2)))
     status, text, mebibytes = run_measured("reconstruct", empty, "-o", out, "--tlt", angles,
                                            "--thickness", 300, "--bin", 4, "--dry-run")
-    assert status == 2 and "section 1" in text and "constant" in text, text
+    assert status == 2 and "in every view" in text and "same value" in text, text
     assert (mebibytes < 1024 or is_sanitized()), mebibytes
     os.remove(empty)
 

@@ -9,6 +9,7 @@ import re
 import mrcfile
 import numpy as np
 import pytest
+import tifffile
 
 import harness
 from harness import fresh_directory
@@ -665,3 +666,29 @@ def test_a_stack_that_was_phase_flipped_is_named():
              "--overwrite", "-o", "out.mrc"]
     expect(harness.succeed(*words, cwd=folder).stderr, "ctfphaseflip", "--ctf-phase-flipped")
     assert "ctfphaseflip" not in harness.succeed(*words, "--ctf-phase-flipped", cwd=folder).stderr
+
+
+def test_the_description_of_a_tiff_stack_states_its_axis(tmp_path):
+    """SerialEM writes there what the labels of an MRC file have."""
+    views = np.random.default_rng(1).normal(1000, 50, (11, 48, 48)).astype(np.uint16)
+    with tifffile.TiffWriter(tmp_path / "s.tif") as file:
+        for i, view in enumerate(views):
+            file.write(view, photometric="minisblack", metadata=None, description=None if i else
+                       "SerialEM: Digitized on Titan\n    Tilt axis angle = 86.1, binning = 1")
+    np.savetxt(tmp_path / "s.tlt", np.linspace(-60, 60, 11))
+    said = harness.tomofield("info", tmp_path / "s.tif", "--tlt", tmp_path / "s.tlt")
+    assert said.returncode == 2 and "turned by 86.1" in said.stderr, said.stderr
+
+
+def test_a_defocus_for_other_pixels_is_warned_of(tmp_path):
+    views = np.random.default_rng(1).normal(1000, 50, (11, 48, 48)).astype(np.float32)
+    harness.write_stack(tmp_path / "s.mrc", views, 5.0)
+    np.savetxt(tmp_path / "s.tlt", np.linspace(-60, 60, 11))
+    for pixel, is_said in ((5.0, False), (2.5, False), (3.11, True)):
+        rows = "".join(f"{i + 1} 30000 29500 42 0 0.15 10\n" for i in range(11))
+        (tmp_path / "c.txt").write_text(
+            f"# Output from CTFFind version 4.1.14\n# Pixel size: {pixel} Angstroms ; acceleration voltage: 300.0 keV\n"
+            f"# Columns: #1 - micrograph number; #2 - defocus 1 [Angstroms]\n{rows}", encoding="utf-8")
+        said = harness.succeed("reconstruct", tmp_path / "s.mrc", "--tlt", tmp_path / "s.tlt", "--ctf", tmp_path / "c.txt",
+                               "--thickness", 24, "--dry-run")
+        assert ("defocus for pixels of 3.11" in said.stderr) == is_said, said.stderr

@@ -45,6 +45,9 @@ class FilesStack : public ImageStack {
       header_.nx = found.nx;
       header_.ny = found.ny;
       header_.voxel_size_A = found.voxel_size_A;
+      header_.labels = found.labels;
+      header_.extended_axis_deg = found.extended_axis_deg;
+      header_.extended_voltage_kV = found.extended_voltage_kV;
     }
     const std::string file = image.file.string();
     if (!image.section && found.nz != 1) {
@@ -58,13 +61,15 @@ class FilesStack : public ImageStack {
                               *image.section + 1, file, found.nz));
     }
     constexpr double kSamePixel = 1e-3;
-    const double pixel_A = header_.voxel_size_A[0];
+    const auto& [width_A, height_A, depth_A] = header_.voxel_size_A;
     if (found.nx != header_.nx || found.ny != header_.ny ||
-        std::fabs(found.voxel_size_A[0] - pixel_A) > kSamePixel * pixel_A) {
-      throw Error(fmt::format(
-          "'{}' has {} × {} pixels of {:g} Å, and the first image of {} {} × {} "
-          "of {:g} Å: the views of a series have one size",
-          file, found.nx, found.ny, found.voxel_size_A[0], name_, header_.nx, header_.ny, pixel_A));
+        std::fabs(found.voxel_size_A[0] - width_A) > kSamePixel * width_A ||
+        std::fabs(found.voxel_size_A[1] - height_A) > kSamePixel * height_A) {
+      throw Error(
+          fmt::format("'{}' has {} × {} pixels of {:g} × {:g} Å, and the first image of {} "
+                      "{} × {} of {:g} × {:g} Å: the views of a series have one size",
+                      file, found.nx, found.ny, found.voxel_size_A[0], found.voxel_size_A[1], name_,
+                      header_.nx, header_.ny, width_A, height_A));
     }
   }
 

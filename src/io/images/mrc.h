@@ -44,6 +44,8 @@ struct MrcHeader {
   std::vector<double> extended_tilt_deg;  ///< angles in the extended header, one a section, or none
   /// Direction of the tilt axis in the extended header, counter-clockwise from +Y.
   std::optional<double> extended_axis_deg;
+  std::optional<double> extended_voltage_kV;  ///< of the microscope, in the extended header
+  bool has_pieces = false;  ///< by the extended header: sections are the pieces of montages
   std::vector<std::string> labels;
 };
 

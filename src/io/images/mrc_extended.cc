@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <vector>
 
@@ -48,9 +49,10 @@ void take_tilts(std::vector<double> tilts_deg, MrcHeader& header) {
   if (are_angles && differ) header.extended_tilt_deg = std::move(tilts_deg);
 }
 
-void take_pixel_size(double size_A, MrcHeader& header) {
+void take_pixel_size(double width_A, double height_A, MrcHeader& header) {
   const bool has_one = header.voxel_size_A[0] != 0.0 && header.voxel_size_A[0] != 1.0;
-  if (!has_one && base::is_plausible_pixel_size(size_A)) header.voxel_size_A.fill(size_A);
+  if (has_one || !base::is_plausible_pixel_size(width_A)) return;
+  header.voxel_size_A = {width_A, height_A, width_A};
 }
 
 void take_axis(double axis_deg, MrcHeader& header) {
@@ -58,8 +60,24 @@ void take_axis(double axis_deg, MrcHeader& header) {
     header.extended_axis_deg = std::remainder(axis_deg, 360.0);
 }
 
+// Tells whether two sections have the same place along Z, by the coordinates of pieces after the
+// tilt.
+bool has_pieces(std::span<const std::byte> extended, const ExtendedRecords& records,
+                const MrcHeader& header) {
+  constexpr std::int64_t kZ = 6;
+  std::set<std::int16_t> places;
+  for (std::int64_t section = 0; section < header.nz; ++section)
+    if (!places
+             .insert(number_at<std::int16_t>(extended, section * records.bytes_per_section + kZ,
+                                             header.is_byte_swapped))
+             .second)
+      return true;
+  return false;
+}
+
 void read_serialem(std::span<const std::byte> extended, const ExtendedRecords& records,
                    MrcHeader& header) {
+  header.has_pieces = records.has_piece_coordinates && has_pieces(extended, records, header);
   std::vector<double> tilts_deg;
   for (std::int64_t section = 0; section < header.nz; ++section)
     tilts_deg.push_back(number_at<std::int16_t>(extended, section * records.bytes_per_section,
@@ -84,7 +102,8 @@ void read_floats(std::span<const std::byte> extended, const ExtendedRecords& rec
   take_axis(records.is_fei ? -value(0, kAxis) : value(0, kAxis), header);
   constexpr double kSmallest_A = 0.05;  // a smaller number is in metres
   const double pixel = value(0, kPixel);
-  take_pixel_size(pixel > kSmallest_A ? pixel : kAngstroms_in_m * pixel, header);
+  const double pixel_A = pixel > kSmallest_A ? pixel : kAngstroms_in_m * pixel;
+  take_pixel_size(pixel_A, pixel_A, header);
 }
 
 // One record of FEI1 or FEI2.
@@ -102,17 +121,22 @@ class FeiRecord {
     const auto found = angle(kAxis);
     return found ? std::optional(-*found) : std::nullopt;
   }
-  std::optional<double> pixel_size_A() const {
-    const auto size_m = value(kPixel);
-    return size_m ? std::optional(kAngstroms_in_m * *size_m) : std::nullopt;
-  }
+  std::optional<double> pixel_width_A() const { return length_A(kPixel); }
+  std::optional<double> pixel_height_A() const { return length_A(kPixelHeight); }
+  std::optional<double> voltage_V() const { return value(kVoltage); }
 
  private:
   struct Field {
     std::int64_t offset;
     int bit;  // of the first mask
   };
-  static constexpr Field kTilt{100, 7}, kAxis{140, 12}, kPixel{156, 14};
+  static constexpr Field kVoltage{84, 5}, kTilt{100, 7}, kAxis{140, 12}, kPixel{156, 14},
+      kPixelHeight{164, 15};
+
+  std::optional<double> length_A(Field field) const {
+    const auto size_m = value(field);
+    return size_m ? std::optional(kAngstroms_in_m * *size_m) : std::nullopt;
+  }
 
   std::optional<double> value(Field field) const {
     const auto mask = number_at<std::uint32_t>(bytes_, 8, is_swapped_);
@@ -145,7 +169,12 @@ void read_fei(std::span<const std::byte> extended, MrcHeader& header) {
   }
   take_tilts(std::move(tilts_deg), header);
   const FeiRecord first(extended, header.is_byte_swapped);
-  if (const auto size_A = first.pixel_size_A()) take_pixel_size(*size_A, header);
+  if (const auto width_A = first.pixel_width_A())
+    take_pixel_size(*width_A, first.pixel_height_A().value_or(*width_A), header);
+  constexpr base::Interval kVoltages_V{2e4, 3e6};
+  constexpr double kVolts_in_kV = 1e3;
+  if (const auto voltage = kVoltages_V.find(first.voltage_V().value_or(0.0)))
+    header.extended_voltage_kV = *voltage / kVolts_in_kV;
   if (const auto axis_deg = first.axis_deg()) take_axis(*axis_deg, header);
 }
 
@@ -164,7 +193,10 @@ ExtendedRecords find_extended_records(const MrcHeaderBytes& bytes, const MrcHead
       type == "SERI" || (type.empty() && first == bytes_of_section_flags(static_cast<int>(second)));
   if (is_serialem) {
     if (!(second & 1) || first < 2 || !fits(first)) return {};
-    return {.layout = ExtendedLayout::kSerialEm, .bytes_per_section = first};
+    constexpr int kPieces = 2;
+    return {.layout = ExtendedLayout::kSerialEm,
+            .bytes_per_section = first,
+            .has_piece_coordinates = (second & kPieces) != 0 && first >= 8};
   }
   if ((!type.empty() && type != "AGAR") || first < 0 || second < 1) return {};
   const std::int64_t record = 4 * (first + second);

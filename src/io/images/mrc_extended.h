@@ -21,19 +21,20 @@ enum class ExtendedLayout {
 struct ExtendedRecords {
   ExtendedLayout layout = ExtendedLayout::kNone;
   std::int64_t bytes_per_section = 0;
-  std::int64_t first_float = 0;  ///< byte of the record (kFloats)
-  std::int64_t num_floats = 0;   ///< (kFloats)
-  bool is_fei = false;           ///< kFloats: FEI wrote it, whose axis has the opposite sign
+  std::int64_t first_float = 0;        ///< byte of the record (kFloats)
+  std::int64_t num_floats = 0;         ///< (kFloats)
+  bool is_fei = false;                 ///< kFloats: FEI wrote it, whose axis has the opposite sign
+  bool has_piece_coordinates = false;  ///< kSerialEm: after the tilt
 };
 
 /// Returns the layout of the extended header of a file with this fixed header. The record of kFei
 /// states its own length: its `bytes_per_section` is 0.
 ExtendedRecords find_extended_records(const MrcHeaderBytes& bytes, const MrcHeader& header);
 
-/// Reads the tilt angles, the pixel size and the tilt axis from the bytes of an extended header
-/// into `header`; what it does not state, or what cannot be, stays as it is. The pixel size is
-/// taken if the fixed header has none. Follows IMOD's `extracttilts` and `header` (extraheader.c,
-/// header.f90), and the description of FEI1 by EPU's manual.
+/// Reads the tilt angles, the pixel size, the tilt axis and the voltage from the bytes of an
+/// extended header into `header`; what it does not state, or what cannot be, stays as it is. The
+/// pixel size is taken if the fixed header has none. Follows IMOD's `extracttilts` and `header`
+/// (extraheader.c, header.f90), and the description of FEI1 by EPU's manual.
 void read_extended_records(std::span<const std::byte> extended, const ExtendedRecords& records,
                            MrcHeader& header);
 

@@ -110,6 +110,18 @@ TEST(Mrc, FloatRecordsOfExtendedHeaders) {
       header_with_extended(std::string(144, '\0'), no_type, 0, 12).extended_tilt_deg.empty());
 }
 
+TEST(Mrc, PiecesOfMontagesByTheHeaderOfSerialEm) {
+  const auto records = [](char z_of_second) {
+    std::string extended(24, '\0');
+    extended[0] = 100;  // the tilt, in hundredths of a degree
+    extended[14] = z_of_second;
+    extended[22] = 2;
+    return extended;
+  };
+  EXPECT_TRUE(header_with_extended(records(0), "SERI", 8, 3).has_pieces);
+  EXPECT_FALSE(header_with_extended(records(1), "SERI", 8, 3).has_pieces);
+}
+
 TEST(Mrc, RecordsOfFei1) {
   constexpr std::uint32_t kTilt = 1u << 7, kAxis = 1u << 12, kPixel = 1u << 14;
   const auto records = [](std::size_t size, std::uint32_t mask, const char* version) {
@@ -121,7 +133,9 @@ TEST(Mrc, RecordsOfFei1) {
       record.replace(68, std::string(version).size(), version);
       put(record, 100, tilt);
       put(record, 140, -86.25);
+      put(record, 84, 200000.0);
       put(record, 156, 3.5e-10);
+      put(record, 164, 7e-10);
       extended += record;
     }
     return extended;
@@ -133,10 +147,16 @@ TEST(Mrc, RecordsOfFei1) {
     EXPECT_NEAR(header.voxel_size_A[0], 3.5, 1e-6);
     EXPECT_EQ(header.extended_axis_deg, 86.25);
   }
+  constexpr std::uint32_t kVoltage = 1u << 5, kPixelHeight = 1u << 15;
+  const MrcHeader more = header_with_extended(
+      records(768, kTilt | kPixel | kVoltage | kPixelHeight, "5.1"), "FEI1", 0, 0);
+  EXPECT_EQ(more.extended_voltage_kV, 200.0);
+  EXPECT_NEAR(more.voxel_size_A[0], 3.5, 1e-6);
+  EXPECT_NEAR(more.voxel_size_A[1], 7.0, 1e-6);
   const MrcHeader masked = header_with_extended(records(768, kTilt, "5.1"), "FEI1", 0, 0);
   EXPECT_EQ(masked.extended_tilt_deg.size(), 3u);
   EXPECT_EQ(masked.voxel_size_A[0], 1.0);
-  EXPECT_FALSE(masked.extended_axis_deg);
+  EXPECT_FALSE(masked.extended_axis_deg || masked.extended_voltage_kV);
   EXPECT_TRUE(
       header_with_extended(records(768, kPixel, "5.1"), "FEI1", 0, 0).extended_tilt_deg.empty());
   // Radians, of one version of the software.

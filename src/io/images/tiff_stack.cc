@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <cstring>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -78,6 +79,22 @@ class TiffFile {
 
   // Returns the most bytes that a page of this file can have.
   double most_bytes() const { return kLargestCompression * static_cast<double>(file_bytes_); }
+
+  // Returns the lines of the description of the page that the file is at. SerialEM writes there
+  // what the labels of an MRC file have.
+  std::vector<std::string> description() const {
+    constexpr std::size_t kMostLines = 20, kLongestLine = 200;
+    const char* text = nullptr;
+    if (TIFFGetField(handle_, TIFFTAG_IMAGEDESCRIPTION, &text) == 0 || text == nullptr) return {};
+    std::vector<std::string> lines;
+    std::string_view rest(text);
+    while (!rest.empty() && lines.size() < kMostLines) {
+      const std::size_t end = std::min(rest.find('\n'), rest.size());
+      lines.emplace_back(rest.substr(0, std::min(end, kLongestLine)));
+      rest.remove_prefix(std::min(end + 1, rest.size()));
+    }
+    return lines;
+  }
 
   // Returns the format of the page that the file is at. Throws Error for one that is not read.
   PageFormat format(std::size_t page) const {
@@ -277,6 +294,7 @@ class TiffStack : public ImageStack {
     const TiffFile file(path_);
     format_ = file.format(0);
     header_.voxel_size_A = {format_.pixel_width_A, format_.pixel_height_A, format_.pixel_width_A};
+    header_.labels = file.description();
     for (;;) {
       const PageFormat of_page = file.format(pages_.size());
       if (of_page != format_) refuse(file, of_page);

@@ -61,6 +61,7 @@ void read_comment(const std::filesystem::path& path, const TextLine& line, State
   };
   require_unit(path, line, "defocus 1", "A");
   require_unit(path, line, "phase shift", "rad");
+  take("Pixel size:", "Angstroms", optics.pixel_size_A);
   take("acceleration voltage:", "keV", optics.voltage_kV);
   take("spherical aberration:", "mm", optics.spherical_aberration_mm);
   take("amplitude contrast:", "", optics.amplitude_contrast);

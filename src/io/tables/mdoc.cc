@@ -180,12 +180,14 @@ std::optional<std::int64_t> parse_time(std::string_view text) {
     if (!number || *number < 0 || *number > 60) return std::nullopt;
     seconds = 60 * seconds + *number;
   }
+  constexpr std::int64_t kCentury = 2000;  // of years that are written with two digits
   const auto is_small = [](std::int64_t number) { return number >= 0 && number <= 9999; };
   if (!day || !month || !year || !is_small(*day) || !is_small(*month) || !is_small(*year))
     return std::nullopt;
-  const std::chrono::year_month_day on_day{std::chrono::year(static_cast<int>(*year)),
-                                           std::chrono::month(static_cast<unsigned>(*month)),
-                                           std::chrono::day(static_cast<unsigned>(*day))};
+  const std::chrono::year_month_day on_day{
+      std::chrono::year(static_cast<int>(*year < 100 ? kCentury + *year : *year)),
+      std::chrono::month(static_cast<unsigned>(*month)),
+      std::chrono::day(static_cast<unsigned>(*day))};
   if (!on_day.ok()) return std::nullopt;
   const std::chrono::seconds midnight = std::chrono::sys_days(on_day).time_since_epoch();
   return midnight.count() + seconds;

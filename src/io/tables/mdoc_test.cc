@@ -86,6 +86,8 @@ TEST(Mdoc, OrderIsByTimeElseByDoseElseByNumber) {
                       "DateTime = 28-Feb-21  23:59:59\nPriorRecordDose = 6",
                       "DateTime = 01-Mar-21  00:00:01\nPriorRecordDose = 3"}),
             (Order{1, 2, 0}));
+  EXPECT_EQ(order_of({"DateTime = 01-Mar-24 00:00:03", "DateTime = 29-Feb-2024 23:59:59"}),
+            (std::vector<std::size_t>{1, 0}));
   EXPECT_EQ(order_of({"DateTime = 2024-03-01 00:00:03", "DateTime = 2024-02-29 23:59:59"}),
             (Order{1, 0}));
   // One of the times is none, or two are the same.

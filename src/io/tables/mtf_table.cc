@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "io/tables/star_file.h"
 #include "tomofield/error.h"
 
@@ -41,6 +43,9 @@ MtfTable read_mtf(const std::filesystem::path& path) {
   }
   if (mtf.values.size() < 2)
     throw Error(fmt::format("'{}' has fewer than two frequencies", path.string()));
+  if (std::ranges::all_of(mtf.values, [](double value) { return value == 0.0; }))
+    throw Error(
+        fmt::format("'{}' has no value above 0: such a detector sees nothing", path.string()));
   return mtf;
 }
 

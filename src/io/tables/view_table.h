@@ -31,6 +31,7 @@ struct Defocus {
 /// The microscope as a file states it; none: it is not in the file.
 struct StatedOptics {
   std::optional<double> voltage_kV, spherical_aberration_mm, amplitude_contrast;
+  std::optional<double> pixel_size_A = {};  ///< of the images in which the defocus was measured
 };
 
 /// Voltages that microscopes have.

@@ -334,6 +334,7 @@ void check_pixels(const WarpXml& xml, ViewTable& table) {
   if (size_A && !base::is_plausible_pixel_size(*size_A))
     throw Error(
         fmt::format("'{}': a PixelSize of {} Å is none: correct it", table.file.string(), *size_A));
+  table.optics.pixel_size_A = size_A;
   for (const char* name : {"PixelSizeDelta", "PixelSizeDeltaPercent"})
     if (xml.ctf_parameter(name).value_or(0.0) != 0.0)
       table.not_applied.emplace_back(fmt::format("{}, pixels that are not square", name));
