@@ -92,6 +92,74 @@ std::set<fs::path> outputs_to_replace(const PlanOptions& options) {
   return outputs;
 }
 
+bool is_stopped(const PlanOptions& options) {
+  return options.stop_requested && options.stop_requested();
+}
+
+// Makes jobs of series, and collects what is wrong with them.
+class Planner {
+ public:
+  explicit Planner(const PlanOptions& options)
+      : options_(options),
+        scratch_(options.folder, ".tomofield-plan"),
+        to_replace_(outputs_to_replace(options)) {}
+
+  Job plan(const Series& series) {
+    Job job{.name = series.name,
+            .output = series.output,
+            .command = command_of(series, options_.common),
+            .needs = {},
+            .files = {.inputs = {series.input}, .results = {}, .relion_tomogram = {}}};
+    job.replaces =
+        options_.overwrites || to_replace_.contains(fs::absolute(job.output).lexically_normal());
+    job.is_skipped = options_.skips_existing && !job.replaces && has_results(job.output);
+    if (job.is_skipped)
+      check_results(series, job);
+    else
+      rehearse(series, job);
+    return job;
+  }
+
+  // Throws Error with all mistakes, also those of files that several jobs write or read.
+  void require_no_faults(const std::vector<Job>& jobs) {
+    check_files(options_.folder, options_.list, jobs, faults_);
+    require_none(faults_);
+    warn_of_missing_rows(without_row_);
+  }
+
+ private:
+  void check_results(const Series& series, Job& job) {
+    job.files.relion_tomogram = tomogram_of_result(job);
+    if (series.is_tomogram && job.files.relion_tomogram.empty()) without_row_.push_back(job.name);
+    if (const std::string fault = fault_of_results(job.output); !fault.empty())
+      faults_.add(fmt::format("{}: {}: {}", series.source, fault, advice_on_files(job.output)));
+  }
+
+  void rehearse(const Series& series, Job& job) {
+    const fs::path plan = scratch_.plan(), log = scratch_.log();
+    fs::remove(plan);
+    const base::ChildResult result =
+        base::run_child(plan_command(options_, job, plan), log, options_.stop_requested);
+    if (is_stopped(options_)) return;
+    if (result.exit_status != 0) {
+      const std::string said = base::reason_of_failure(result.exit_status, log);
+      faults_.add(fmt::format("{}: {}", series.source,
+                              job.replaces ? said : reason_in_batch(said, job.output)));
+      return;
+    }
+    const record::PlanRecord planned = record::read_plan(plan);
+    add_plan(planned, job);
+    stacks_.require_new(planned.stack, series, faults_);
+  }
+
+  const PlanOptions& options_;
+  const io::ScratchFolder scratch_;
+  const std::set<fs::path> to_replace_;
+  base::Faults faults_;
+  Stacks stacks_;
+  std::vector<std::string> without_row_;
+};
+
 }  // namespace
 
 fs::path output_of(const Series& series, const fs::path& folder) {
@@ -136,48 +204,15 @@ void check_tomograms(const std::vector<Series>& all, const std::vector<GivenOpti
 }
 
 JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
-  const io::ScratchFolder scratch(options.folder, ".tomofield-plan");
-  const fs::path plan = scratch.plan(), log = scratch.log();
-  base::Faults faults;
-  Stacks stacks;
-  std::vector<std::string> without_row;
-  const std::set<fs::path> to_replace = outputs_to_replace(options);
+  Planner planner(options);
   JobList list{.jobs = {}, .overwrites = options.overwrites};
   for (const Series& series : all) {
-    Job job{.name = series.name,
-            .output = series.output,
-            .command = command_of(series, options.common),
-            .needs = {},
-            .files = {.inputs = {series.input}, .results = {}, .relion_tomogram = {}}};
-    job.replaces =
-        options.overwrites || to_replace.contains(fs::absolute(job.output).lexically_normal());
-    job.is_skipped = options.skips_existing && !job.replaces && has_results(job.output);
-    if (job.is_skipped) {
-      job.files.relion_tomogram = tomogram_of_result(job);
-      if (series.is_tomogram && job.files.relion_tomogram.empty()) without_row.push_back(job.name);
-      if (const std::string fault = fault_of_results(series.output); !fault.empty())
-        faults.add(fmt::format("{}: {}: {}", series.source, fault, advice_on_files(series.output)));
-    } else {
-      fs::remove(plan);
-      const base::ChildResult result =
-          base::run_child(plan_command(options, job, plan), log, options.stop_requested);
-      if (options.stop_requested && options.stop_requested()) return list;
-      if (result.exit_status != 0) {
-        const std::string said = base::reason_of_failure(result.exit_status, log);
-        faults.add(fmt::format("{}: {}", series.source,
-                               options.overwrites ? said : reason_in_batch(said, series.output)));
-      } else {
-        const record::PlanRecord planned = record::read_plan(plan);
-        add_plan(planned, job);
-        stacks.require_new(planned.stack, series, faults);
-      }
-    }
+    Job job = planner.plan(series);
+    if (is_stopped(options)) return list;
     list.jobs.push_back(std::move(job));
   }
   join_rows(list.jobs);
-  check_files(options.folder, options.list, list.jobs, faults);
-  require_none(faults);
-  warn_of_missing_rows(without_row);
+  planner.require_no_faults(list.jobs);
   return list;
 }
 

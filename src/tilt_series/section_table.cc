@@ -130,6 +130,7 @@ SectionTable sections_of_views(const io::ViewTable& table, const io::ImageStack&
   require_count(table.views.size(), table.file, "views", stack);
   SectionTable sections{
       .source = table.file.string(), .of_section = {}, .is_nominal = table.is_nominal};
+  if (!table.views.empty()) sections.nominal_axis_deg = table.views.front().nominal_axis_deg;
   for (const io::ListedView& view : table.views) {
     sections.of_section.emplace_back();
     sections.nominal_tilt_deg.push_back(view.nominal_tilt_deg);

@@ -32,6 +32,7 @@ struct SectionTable {
   /// [section]: what AreTomo moves by itself; empty without a local alignment.
   std::vector<std::vector<io::AreTomoPatch>> patches = {};
   Angles nominal_tilt_deg = {};  ///< those of the microscope, beside refined ones; else empty
+  std::optional<double> nominal_axis_deg = {};  ///< of the first view, beside a refined one
   bool is_nominal = false;  ///< the angles are those of the microscope, and nothing is aligned yet
 };
 

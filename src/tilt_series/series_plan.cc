@@ -404,6 +404,9 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
     if (table) warn_of_other_nominal_angles(*table);
     if (axis && mdoc) warn_of_two_axes(*axis, axis_of_header(stack));
     if (axis && alignment) warn_of_other_axis(*axis, alignment->axis_deg(), options, stack);
+    if (table && table->nominal_axis_deg && alignment && !options.xf)
+      warn_of_other_axis({*table->nominal_axis_deg, "its _rlnTomoNominalTiltAxisAngle"},
+                         alignment->axis_deg(), options, stack);
     if (alignment) warn_of_turned_views(alignment->axes_deg, alignment->axis_deg(), options, stack);
     if (options.tilt_axis_deg)
       warn_of_given_axis(*options.tilt_axis_deg, axis_of_files(options, stack, table, mdoc));

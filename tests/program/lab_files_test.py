@@ -216,6 +216,16 @@ def test_a_given_axis_that_contradicts_the_files_is_said():
     expect(dry(nominal, "TS_01.star", "--tilt-axis", 40), "turns the views by 40°", "states 85.3°")
 
 
+@pytest.mark.parametrize("nominal_deg, said", [(3, ""), (86.2, "are they of one series?"), (-178, "mirrored in z")])
+def test_a_nominal_axis_that_contradicts_the_refined_one_is_said(nominal_deg, said):
+    folder = write_series("refined_axis", 0, stack="TS_01.mrcs")
+    write(folder, "TS_01.star", "\ndata_TS_01\n\nloop_\n_rlnMicrographName\n_rlnTomoNominalTiltAxisAngle\n_rlnTomoYTilt\n"
+          "_rlnTomoZRot\n_rlnTomoXShiftAngst\n_rlnTomoYShiftAngst\n"
+          + "".join(f"{i + 1:06}@TS_01.mrcs {nominal_deg} {tilt:.2f} 2 0 0\n" for i, tilt in enumerate(TILTS)))
+    found = dry(folder, "TS_01.star")
+    assert said in found and ("rlnTomoNominalTiltAxisAngle" in found) == bool(said), found
+
+
 @pytest.mark.parametrize("words", (["info"], ["baseline", "wbp", "-o", "x.mrc"],
                                    ["compare", "--methods", "wbp", "-o", "x"]))
 def test_commands_without_align_name_those_that_have_it(words):

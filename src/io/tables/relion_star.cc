@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kLargestShift_A = base::kLargestPosition_px;
 constexpr const char* kNominalTilt = "rlnTomoNominalStageTiltAngle";
+constexpr const char* kNominalAxis = "rlnTomoNominalTiltAxisAngle";
 
 // Returns the size of the tomogram. RELION writes three zeros for those that are not reconstructed
 // yet, once a table has the columns (MetaDataTable::addLabel).
@@ -130,12 +131,11 @@ ListedView view_of(const StarRow& row, const StarTable& table, bool is_nominal) 
   view.odd = row.find_text("rlnMicrographNameOdd").value_or("");
   if (is_nominal) {
     view.tilt_deg = row.number(kNominalTilt, base::kLargestAngle_deg);
-    view.rotation_deg =
-        row.find_stated_number("rlnTomoNominalTiltAxisAngle", base::kLargestAngle_deg)
-            .value_or(0.0);
+    view.rotation_deg = row.find_stated_number(kNominalAxis, base::kLargestAngle_deg).value_or(0.0);
   } else {
     view.tilt_deg = row.number("rlnTomoYTilt", base::kLargestAngle_deg);
     view.nominal_tilt_deg = row.find_number(kNominalTilt, base::kLargestAngle_deg);
+    view.nominal_axis_deg = row.find_number(kNominalAxis, base::kLargestAngle_deg);
     view.x_tilt_deg = row.find_stated_number("rlnTomoXTilt", base::kLargestAngle_deg).value_or(0.0);
     view.rotation_deg = row.number("rlnTomoZRot", base::kLargestAngle_deg);
     view.shift_x_A = row.number("rlnTomoXShiftAngst", kLargestShift_A);

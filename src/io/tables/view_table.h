@@ -50,10 +50,11 @@ struct ListedView {
   std::string even, odd;  ///< images of half of the frames; empty: not in the file
   bool is_used = true;    ///< false: another program left the view out
   double tilt_deg = 0.0;  ///< rotation about +Y
-  std::optional<double> nominal_tilt_deg{};  ///< that of the microscope, beside a refined one
-  double x_tilt_deg = 0.0;                   ///< rotation about +X, before the tilt
-  double rotation_deg = 0.0;                 ///< of the tilt axis, counter-clockwise from +Y
-  double shift_x_A = 0.0;                    ///< in the recorded image
+  /// Those of the microscope, beside refined ones.
+  std::optional<double> nominal_tilt_deg{}, nominal_axis_deg{};
+  double x_tilt_deg = 0.0;    ///< rotation about +X, before the tilt
+  double rotation_deg = 0.0;  ///< of the tilt axis, counter-clockwise from +Y
+  double shift_x_A = 0.0;     ///< in the recorded image
   double shift_y_A = 0.0;
   std::optional<double> dose_before;  ///< electrons per Å² before the view
   std::optional<Defocus> defocus;
