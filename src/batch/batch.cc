@@ -68,7 +68,7 @@ void begin_batch(const fs::path& folder, const JobList& list) {
   write_jobs(list_of(folder), list);
   for (const Job& job : list.jobs) {
     State state = read_state(folder, job);
-    // What a stopped batch had begun to replace goes on from there.
+    // A job that a stopped batch had begun, and that replaces results, goes on from its checkpoint.
     const bool goes_on = job.replaces && !list.overwrites && has_begun(state);
     state.progress = job.is_skipped ? Progress::kSkipped
                      : goes_on      ? Progress::kStopped

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <set>
@@ -13,6 +12,7 @@
 
 #include "base/log.h"
 #include "exchange/relion_output.h"
+#include "io/file_start.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_set.h"
 #include "io/tables/star_file.h"
@@ -74,9 +74,7 @@ fs::path input_of(const Job& job) {
 fs::path relion_table(const fs::path& folder) { return folder / "tomograms.star"; }
 
 bool has_relion_table(const fs::path& folder) {
-  std::string line(kMark.size(), '\0');
-  std::ifstream file(relion_table(folder));
-  return file.read(line.data(), std::ssize(line)) && line == kMark;
+  return io::begins_with(relion_table(folder), kMark);
 }
 
 std::string tomogram_of_result(const Job& job) {

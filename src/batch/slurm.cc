@@ -14,6 +14,7 @@
 #include "base/system/child_process.h"
 #include "batch/packing.h"
 #include "batch/state_record.h"
+#include "io/file_start.h"
 #include "io/is_file.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -151,10 +152,8 @@ fs::path answer_of(const fs::path& folder, std::optional<int> task) {
 }
 
 bool has_script(const fs::path& folder) {
-  const std::string start = fmt::format("{}#SBATCH {}\n", kFirstLine, kFirstOption);
-  std::string text(start.size(), '\0');
-  std::ifstream file(script_of(folder));
-  return file.read(text.data(), std::ssize(text)) && text == start;
+  return io::begins_with(script_of(folder),
+                         fmt::format("{}#SBATCH {}\n", kFirstLine, kFirstOption));
 }
 
 std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jobs) {

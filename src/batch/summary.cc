@@ -5,7 +5,6 @@
 
 #include <array>
 #include <chrono>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <string>
@@ -19,6 +18,7 @@
 #include "batch/csv.h"
 #include "batch/relion_table.h"
 #include "batch/state_record.h"
+#include "io/file_start.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_lock.h"
 #include "io/saving/output_set.h"
@@ -218,9 +218,7 @@ io::OutputLock wait_for_lock(const fs::path& file) {
 }  // namespace
 
 bool has_summary(const fs::path& folder) {
-  std::string columns(kColumns.size(), '\0');
-  std::ifstream file(summary_table(folder));
-  return file.read(columns.data(), std::ssize(columns)) && columns == kColumns;
+  return io::begins_with(summary_table(folder), kColumns);
 }
 
 fs::path summary_table(const fs::path& folder) { return folder / "summary.csv"; }

@@ -50,7 +50,7 @@ struct ListedView {
   std::string even, odd;  ///< images of half of the frames; empty: not in the file
   bool is_used = true;    ///< false: another program left the view out
   double tilt_deg = 0.0;  ///< rotation about +Y
-  /// Those of the microscope, beside refined ones.
+  /// The tilt and the axis that the microscope states, where the table has refined ones, too.
   std::optional<double> nominal_tilt_deg{}, nominal_axis_deg{};
   double x_tilt_deg = 0.0;    ///< rotation about +X, before the tilt
   double rotation_deg = 0.0;  ///< of the tilt axis, counter-clockwise from +Y
