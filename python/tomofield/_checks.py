@@ -70,7 +70,7 @@ def count_of(value: object, what: str) -> int:
 
 def numbers_of(values: Any, count: int, one_of: Callable[[object, str], float], what: str) -> Any:
     """Return a tuple of `count` numbers, each as one_of() returns it."""
-    parts = values if isinstance(values, (tuple, list)) else _array(values).ravel().tolist()
+    parts = values if isinstance(values, (tuple, list)) else as_array(values).ravel().tolist()
     if len(parts) != count:
         raise TypeError(f"{what} is {count} numbers, not {shown(values)}")
     return tuple(one_of(part, what) for part in parts)
@@ -97,7 +97,7 @@ def array_of(value: Any, numbers: Type[Any] = np.float32) -> Any:
     if is_masked(value):
         raise Error("an array with masked elements says nothing in their places: fill them "
                     "(numpy.ma.filled), or leave them out")
-    array = (_array(value) if hasattr(value, "__array__")
+    array = (as_array(value) if hasattr(value, "__array__")
              else _made("an array of numbers is needed", np.asarray, value))
     if array.dtype.kind not in "biuf":
         raise Error(f"an array of real numbers is needed, not one of type {array.dtype}")
@@ -161,7 +161,7 @@ def _is_number(value: object, types: Tuple[type, ...]) -> bool:
     return isinstance(value, types) and not isinstance(value, (bool, np.timedelta64))
 
 
-def _array(value: object) -> Any:
+def as_array(value: object) -> Any:
     """Return an array with its mask, if it has one; one without numbers for what is no array, which
     the compiled part refuses."""
     try:
@@ -207,7 +207,7 @@ def _leaves(value: object) -> Iterator[Any]:
         if types <= {int, float}:
             return
         if not types <= {list, tuple}:
-            yield from (_array(part) for part in level if not _is_sequence(part))
+            yield from (as_array(part) for part in level if not _is_sequence(part))
             level = [part for part in level if _is_sequence(part)]
         level = list(itertools.chain.from_iterable(level))
 

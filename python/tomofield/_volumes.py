@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core, _pictures
-from ._checks import (Path, array_of, chosen, count_of, is_masked, number_of, numbers_of, path_of,
+from ._checks import (Path, array_of, as_array, chosen, count_of, is_masked, number_of, numbers_of, path_of,
                       places_of, shown, switch_of, text_of, whole_number_of)
 from ._core import Error
 
@@ -33,12 +33,12 @@ class Tomogram:
     def __post_init__(self) -> None:
         if is_masked(self.values):
             raise Error("a tomogram has no masked voxels: fill them (numpy.ma.filled)")
-        if np.ndim(self.values) != 3:
-            raise Error(f"a tomogram has values [z, y, x], and these have {np.ndim(self.values)} "
-                        "dimensions")
-        numbers = np.asanyarray(self.values).dtype
-        if numbers.kind not in "biuf":
-            raise Error(f"a tomogram has real numbers, and these are of type {numbers}")
+        values = as_array(self.values)
+        if values.ndim != 3:
+            raise Error(f"a tomogram has values [z, y, x], and these have {values.ndim} dimensions")
+        if values.dtype.kind not in "biuf":
+            raise Error(f"a tomogram has real numbers, and these are of type {values.dtype}")
+        object.__setattr__(self, "values", values)
         size = number_of(self.voxel_size_A, "voxel_size_A")
         object.__setattr__(self, "voxel_size_A", size if size == 0 else _plausible(size))
 

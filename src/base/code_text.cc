@@ -1,5 +1,8 @@
 #include "base/code_text.h"
 
+#include <algorithm>
+#include <cctype>
+
 #include "base/utf8.h"
 
 namespace tomofield::base {
@@ -25,6 +28,20 @@ std::string Markup::quoted(std::string_view text) {
     }
   }
   return escaped;
+}
+
+std::string Shell::quoted(std::string_view text) {
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
+  return word + "'";
+}
+
+std::string Shell::quoted_if_needed(std::string_view text) {
+  const bool is_plain = std::ranges::all_of(text, [](unsigned char c) {
+    return c >= 0x80 || std::isalnum(c) != 0 ||
+           std::string_view("/._-+=:,@%").find(static_cast<char>(c)) != std::string_view::npos;
+  });
+  return is_plain && !text.empty() ? std::string(text) : quoted(text);
 }
 
 }  // namespace tomofield::base

@@ -73,4 +73,11 @@ struct Markup {
 };
 using Html = CodeText<Markup>;
 
+/// The language of the shell. A text from outside becomes one word of it.
+struct Shell {
+  static std::string quoted(std::string_view text);
+  /// Leaves a word of letters, digits and "/._-+=:,@%" as it is, for commands that people read.
+  static std::string quoted_if_needed(std::string_view text);
+};
+
 }  // namespace tomofield::base

@@ -25,6 +25,20 @@ concept CanBeFormatted = requires(const Parts&... parts) {
   Code::format("{}", parts...);
 };
 
+TEST(CodeText, QuotesAWordOfTheShellWhereItNeedsIt) {
+  EXPECT_EQ(Shell::quoted_if_needed("a/b-1.mrc"), "a/b-1.mrc");
+  EXPECT_EQ(Shell::quoted_if_needed(""), "''");
+  for (int c = 1; c < 0x80; ++c) {
+    const std::string name = "a" + std::string(1, static_cast<char>(c));
+    const bool is_special =
+        std::string_view(" \t\n\r|&;<>()$`\\\"'*?[]#~!{}^").find(static_cast<char>(c)) !=
+        std::string_view::npos;
+    if (!is_special) continue;
+    EXPECT_EQ(Shell::quoted_if_needed(name), Shell::quoted(name)) << c;
+  }
+  EXPECT_EQ(Shell::quoted("it's"), "'it'\\''s'");
+}
+
 TEST(CodeText, QuotesWhatComesFromOutside) {
   const std::string name = "a; b";
   Code code = "run ";

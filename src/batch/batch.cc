@@ -1,11 +1,13 @@
 #include "batch/batch.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <limits>
 
+#include "base/log.h"
 #include "base/system/memory.h"
 #include "batch/choice.h"
 #include "batch/file_conflicts.h"
@@ -24,6 +26,29 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kGibibyte = 1 << 30;
+
+// Names the series of an earlier batch by Slurm that are not at their end and not in the new list:
+// tasks that still wait for them make nothing.
+void warn_of_waiting_tasks(const fs::path& folder, const JobList& list) {
+  if (!has_script(folder)) return;
+  std::vector<std::string> waiting;
+  try {
+    for (const Job& job : read_jobs(list_of(folder)).jobs) {
+      const Progress progress = read_state(folder, job).progress;
+      if ((progress == Progress::kWaiting || progress == Progress::kRunning ||
+           progress == Progress::kStopped) &&
+          std::ranges::find(list.jobs, job.output, &Job::output) == list.jobs.end())
+        waiting.push_back(job.name);
+    }
+  } catch (const Error&) {
+    return;  // the list is damaged, or of an earlier version
+  }
+  if (waiting.empty()) return;
+  base::log_warning(
+      fmt::format("an earlier batch in '{}' was given to Slurm and has not finished {}: its tasks "
+                  "that still wait make nothing, so submit these series again in another folder",
+                  folder.string(), fmt::join(waiting, ", ")));
+}
 
 }  // namespace
 
@@ -64,6 +89,7 @@ void require_room(const std::vector<Job>& jobs, const Room& room) {
 }
 
 void begin_batch(const fs::path& folder, const JobList& list) {
+  warn_of_waiting_tasks(folder, list);
   fs::create_directories(log_folder(folder));
   write_jobs(list_of(folder), list);
   for (const Job& job : list.jobs) {

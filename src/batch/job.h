@@ -51,6 +51,8 @@ struct Job {
 struct JobList {
   std::vector<Job> jobs;
   bool overwrites = false;  ///< replace what other runs have left
+  /// When its batch began, in nanoseconds since 1970, which tells it from others in its folder.
+  std::int64_t began_ns = 0;
 };
 
 Needs needs_of(const record::PlanRecord& plan);

@@ -97,14 +97,17 @@ void require_words(const JobList& list) {
 void write_jobs(const fs::path& file, const JobList& list) {
   json jobs = json::array();
   for (const Job& job : list.jobs) jobs.push_back(job_json(job));
-  io::write_json(
-      file, {{"tomofield", TOMOFIELD_VERSION}, {"overwrites", list.overwrites}, {"jobs", jobs}});
+  io::write_json(file, {{"tomofield", TOMOFIELD_VERSION},
+                        {"overwrites", list.overwrites},
+                        {"began_ns", list.began_ns},
+                        {"jobs", jobs}});
 }
 
 JobList read_jobs(const fs::path& file) {
   const auto read = [](const json& document) {
     JobList list;
     list.overwrites = document.at("overwrites").get<bool>();
+    list.began_ns = io::integer_at(document, "began_ns", 0, INT64_MAX);
     for (const json& job : document.at("jobs")) list.jobs.push_back(job_from(job));
     return list;
   };

@@ -35,10 +35,12 @@ TEST(Jobs, AreReadAsTheyAreWritten) {
                          .needs = {},
                          .is_skipped = true,
                          .files = {}}},
-               .overwrites = true};
+               .overwrites = true,
+               .began_ns = 1234};
   write_jobs(directory / "batch.json", list);
   const JobList read = read_jobs(directory / "batch.json");
   EXPECT_TRUE(read.overwrites);
+  EXPECT_EQ(read.began_ns, 1234);
   ASSERT_EQ(read.jobs.size(), 2u);
   EXPECT_EQ(read.jobs[0].output, list.jobs[0].output);
   EXPECT_EQ(read.jobs[0].command, list.jobs[0].command);

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <chrono>
 #include <map>
 #include <set>
 #include <string>
@@ -205,7 +206,10 @@ void check_tomograms(const std::vector<Series>& all, const std::vector<GivenOpti
 
 JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
   Planner planner(options);
-  JobList list{.jobs = {}, .overwrites = options.overwrites};
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  JobList list{.jobs = {},
+               .overwrites = options.overwrites,
+               .began_ns = std::chrono::nanoseconds(now).count()};
   for (const Series& series : all) {
     Job job = planner.plan(series);
     if (is_stopped(options)) return list;

@@ -37,15 +37,7 @@ std::optional<std::int64_t> number_in_environment(const char* name, std::int64_t
   return number && *number > 0 && *number <= most ? number : std::nullopt;
 }
 
-// The language of the script. A text from outside becomes one word of it.
-struct Shell {
-  static std::string quoted(std::string_view text) {
-    std::string word = "'";
-    for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
-    return word + "'";
-  }
-};
-using Script = base::CodeText<Shell>;
+using Script = base::CodeText<base::Shell>;
 
 // Returns the tasks of an array, counted from 1, as Slurm reads them: "1,3,4".
 Script array_of(const std::vector<Job>& jobs) {
@@ -178,9 +170,10 @@ std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jo
                      name_for_sbatch(fs::current_path(), "start the command in a folder")));
   add(Script::format("--output={}/slurm-%A_%a.out", name_for_sbatch(logs, "give -o a folder")));
   add(Script::format("--signal=B:USR1@{}", kWarningSeconds));
-  script += Script::format("exec {} batch {} --output {} --task \"$SLURM_ARRAY_TASK_ID\"\n",
-                           word(options.program), word(fs::absolute(list_of(options.folder))),
-                           word(fs::absolute(options.folder)));
+  script +=
+      Script::format("exec {} batch {} --output {} --began {} --task \"$SLURM_ARRAY_TASK_ID\"\n",
+                     word(options.program), word(fs::absolute(list_of(options.folder))),
+                     word(fs::absolute(options.folder)), options.began_ns);
   return script.text();
 }
 

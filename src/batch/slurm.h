@@ -26,6 +26,7 @@ struct SlurmOptions {
   std::filesystem::path program;  ///< tomofield itself
   std::filesystem::path folder;   ///< of the batch, with the list of its jobs
   int threads = 1;                ///< CPUs of a task
+  std::int64_t began_ns = 0;      ///< of the list of its jobs
   std::vector<std::string> more;  ///< lines of options for sbatch; they go before the usual ones
 };
 

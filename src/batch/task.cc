@@ -41,6 +41,16 @@ State run_to_the_end(const RunOptions& options, const JobList& list, const Job& 
 
 }  // namespace
 
+void require_same_batch(const fs::path& file, const JobList& list,
+                        std::optional<std::int64_t> began_ns) {
+  if (!began_ns || *began_ns == list.began_ns) return;
+  throw Error(
+      fmt::format("'{}' is the list of another batch, which has begun in this folder since this "
+                  "task was submitted: the task makes nothing. Submit its series again, in a "
+                  "folder of their own",
+                  file.string()));
+}
+
 TaskResult run_task(const RunOptions& options, const JobList& list, int number, int threads,
                     const std::function<bool()>& time_is_up) {
   if (number < 1 || number > std::ssize(list.jobs))
@@ -59,6 +69,8 @@ TaskResult run_task(const RunOptions& options, const JobList& list, int number, 
       result.state.reason =
           "its time limit came before the first checkpoint: give more with --sbatch '--time=…'";
     } else {
+      require_same_batch(list_of(options.folder), read_jobs(list_of(options.folder)),
+                         list.began_ns);  // the script that goes on is of the same batch
       result.continued_by = submit(options.folder, number);
       result.state.reason =
           fmt::format("its time limit came; Slurm job {} goes on", result.continued_by);

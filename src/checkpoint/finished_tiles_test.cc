@@ -74,6 +74,11 @@ TEST_F(FinishedTilesTest, AreRefusedIfSomebodyHasChangedThem) {
                                json::array({1}), json::array({tile(0, 32), tile(64, 96)})};
   for (const auto& [begin, end] : {std::pair(0, 128), {0, 200}, {1, 64}, {0, 0}, {64, 0}})
     damaged.push_back(json::array({tile(begin, end)}));
+  for (const double change : {1e30, -0.1}) {
+    json changed = tile(0, 64);
+    changed["mean_square_change"] = change;
+    damaged.push_back(json::array({changed}));
+  }
   for (const char* key : {"rows", "residual", "seconds_fitting", "seconds_compressing", "bytes"})
     for (const json& value : {json(), json("1"), json(-1e300), json{1, 2, 3}}) {
       json changed = tile(0, 64);

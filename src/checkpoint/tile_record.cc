@@ -1,5 +1,7 @@
 #include "checkpoint/tile_record.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "io/json.h"
@@ -57,6 +59,13 @@ FinishedTile tile_from(const json& tile, std::int64_t num_rows) {
                                .variance = number_at(tile, "variance"),
                                .decibels = number_at(tile, "decibels"),
                                .volume = number_at(tile, "volume")}};
+  // Even a model of nothing changes a tile by little more than its variance.
+  constexpr double kLargestChange = 1e3;
+  const compact::CompressionReport& report = read.report;
+  if (report.mean_square_change < 0.0 ||
+      report.mean_square_change > kLargestChange * std::fabs(report.variance))
+    throw Error(fmt::format("its mean_square_change of {:g} is none for a variance of {:g}",
+                            report.mean_square_change, report.variance));
   if (tile.contains("held_out_error") && !tile.at("held_out_error").is_null())
     read.held_out_error = number_at(tile, "held_out_error");
   return read;

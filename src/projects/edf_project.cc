@@ -45,20 +45,38 @@ std::optional<fs::path> first_file(const fs::path& stem, std::array<const char*,
   return std::nullopt;
 }
 
-// Sets the tilt axis, as eTomo's dialog of a new dataset has it. Old versions write it for both
-// axes of a dataset.
-void set_axis(Project& project, const fs::path& edf, const Entries& entries) {
+// The tilt axis, as eTomo's dialog of a new dataset has it.
+struct ImageRotation {
+  const char* entry;
+  double angle_deg;
+};
+
+// Returns the tilt axis that a dataset states, unless the user ignores it. Old versions write one
+// for both axes of a dataset.
+std::optional<ImageRotation> find_rotation(Project& project, const fs::path& edf,
+                                           const Entries& entries) {
   const char* const entry =
       entries.contains("Setup.ImageRotationA") ? "Setup.ImageRotationA" : "Setup.ImageRotation";
   const std::string text = value_of(entries, entry);
-  if (text.empty() || project.ignores(entry)) return;
-  const auto axis_deg = io::parse_number(text, base::kLargestAngle_deg / 2);
-  if (!axis_deg)
-    throw Error(
-        fmt::format("'{}': {} is '{}', which is no angle of a tilt axis: correct it, or go "
-                    "on with --ignore {}",
-                    edf.string(), entry, io::quote(text), entry));
-  project.set("--tilt-axis", fmt::format("{}", *axis_deg), edf, entry);
+  if (text.empty() || project.ignores(entry)) return std::nullopt;
+  if (const auto axis_deg = io::parse_number(text, base::kLargestAngle_deg / 2))
+    return ImageRotation{entry, *axis_deg};
+  throw Error(
+      fmt::format("'{}': {} is '{}', which is no angle of a tilt axis: correct it, or go "
+                  "on with --ignore {}",
+                  edf.string(), entry, io::quote(text), entry));
+}
+
+void compare_axis(Project& project, const fs::path& edf, const Entries& entries) {
+  if (const auto rotation = find_rotation(project, edf, entries))
+    warn_of_other_rotation(project, edf, rotation->entry, rotation->angle_deg);
+}
+
+// Sets the tilt axis of a dataset that is not aligned yet.
+void set_axis(Project& project, const fs::path& edf, const Entries& entries) {
+  const auto rotation = find_rotation(project, edf, entries);
+  if (!rotation) return;
+  project.set("--tilt-axis", fmt::format("{}", rotation->angle_deg), edf, rotation->entry);
   project.warn(
       fmt::format("'{}' is not aligned yet (no .xf): without --align full its views are turned by "
                   "the image rotation, and not shifted",
@@ -95,6 +113,7 @@ void set_dataset(Project& project, const fs::path& edf, const Entries& entries,
     project.set("--tlt", tlt->string(), edf, kEntry);
   if (const fs::path xf = stem.string() + ".xf"; is_file(xf)) {
     project.set("--xf", xf.string(), edf, kEntry);
+    compare_axis(project, edf, entries);
   } else {
     set_axis(project, edf, entries);
   }
@@ -116,11 +135,12 @@ void set_dataset(Project& project, const fs::path& edf, const Entries& entries,
 void read_edf_project(Project& project) {
   const fs::path edf = project.request().path;
   const fs::path tilt = edf.parent_path() / "tilt.com";
+  const Entries entries = read_entries(edf);
   if (is_file(tilt)) {
     project.add_file(tilt);
-    return read_imod_project(project, tilt);
+    read_imod_project(project, tilt);
+    return compare_axis(project, edf, entries);
   }
-  const Entries entries = read_entries(edf);
   const std::string name = value_of(entries, "Setup.DatasetName");
   if (name.empty()) {
     throw Error(fmt::format(

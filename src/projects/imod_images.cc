@@ -249,6 +249,11 @@ ImodImages choose_imod_images(Project& project, CommandEntries& tilt, CommandEnt
   if (!raw && hindrance.empty()) raw = usual_raw_files(project, tilt);
   const auto aligned = find_file(tilt, "InputProjections");
   if (newst != nullptr) newst->know(kHarmless);
+  // Results must not replace the images of the project, whichever of them are read.
+  if (aligned) project.add_file(aligned->path);
+  if (raw) project.add_file(raw->stack.path);
+  if (const auto named = newst == nullptr ? std::nullopt : find_file(*newst, "InputFile"))
+    project.add_file(named->path);
   if (raw) {
     warn_of_absent(project, newst,
                    fmt::format("'{}' with '{}'", raw->stack.path.filename().string(),

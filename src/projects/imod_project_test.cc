@@ -393,6 +393,23 @@ TEST(ImodProject, ThePixelSizeOfTheCommandsIsTakenOrCompared) {
   expect_parts(imod.warnings(), {"ctfplotter.com", "states pixels of 5 Å"});
 }
 
+TEST(ImodProject, TheAxisOfCtfplotterIsComparedWithThatOfTheTransforms) {
+  const ImodFolder imod;
+  imod.write_newst("");
+  imod.write_tilt("THICKNESS 900\n");
+  const auto write = [&](const char* axis) {
+    imod.folder.write("ctfplotter.com",
+                      std::string("$ctfplotter -StandardInput\nAxisAngle ") + axis);
+  };
+  write("-97");
+  EXPECT_EQ(imod.warnings().find("AxisAngle"), std::string::npos) << imod.warnings();
+  write("85.3");
+  expect_parts(imod.warnings(), {"TS.xf", "-99.8°", "AxisAngle", "ctfplotter.com", "85.3°"});
+  EXPECT_EQ(imod.warnings({"AxisAngle"}).find("85.3"), std::string::npos);
+  write("steep");
+  expect_parts(imod.refusal(), {"ctfplotter.com", "line 2", "AxisAngle steep"});
+}
+
 TEST(ImodProject, WhatStandsBehindACommandIsRefused) {
   const ImodFolder imod;
   imod.folder.write("tilt.com", "$tilt -XAXISTILT 3 -StandardInput\nInputProjections TS_ali.mrc\n");

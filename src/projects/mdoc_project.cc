@@ -49,7 +49,7 @@ void read_mdoc_project(Project& project) {
     const bool is_named = stack->filename() == contents.image_file;
     project.set("stack", stack->string(), mdoc, is_named ? "ImageFile" : "its name");
   } else {
-    io::open_mdoc_images(mdoc, mdoc.parent_path());  // throws Error if it cannot
+    io::find_mdoc_images(mdoc, mdoc.parent_path());  // throws Error if it cannot
     project.set("stack", mdoc.string(), mdoc, "SubFramePath");
   }
   project.set("--mdoc", mdoc.string(), mdoc, "ZValue");

@@ -76,6 +76,15 @@ void set_optics(Project& project, const io::RelionTomogram& tomogram, const fs::
   project.set("--defocus-hand", *tomogram.hand < 0.0 ? "1" : "-1", star, "rlnTomoHand");
 }
 
+// Notes the table of a tomogram, which results must not replace.
+void add_table_of(Project& project, const io::RelionTomogram& tomogram, const fs::path& star) {
+  try {
+    project.add_file(io::find_listed_file(tomogram.tilt_series_star, star));
+  } catch (const Error&) {
+    // That of another series is not there.
+  }
+}
+
 // Sets the transfer function of the detector that the row of a tomogram names.
 void set_detector(Project& project, const io::RelionTomogram& tomogram, const fs::path& star) {
   constexpr const char* kEntry = "rlnMtfFileName";
@@ -110,7 +119,7 @@ void read_relion_project(Project& project) {
   const auto tomograms = io::read_relion_tomograms(star).tomograms;
   const io::RelionTomogram& tomogram = choose_tomogram(tomograms, project.request());
   const fs::path views = io::find_listed_file(tomogram.tilt_series_star, star);
-  project.add_file(views);
+  for (const io::RelionTomogram& other : tomograms) add_table_of(project, other, star);
   const bool has_transfer =
       set_views(project, views, star, "rlnTomoTiltSeriesStarFile", tomogram.name);
   if (has_transfer) set_optics(project, tomogram, star);

@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "io/images/image_stack.h"
 #include "io/images/mrc.h"
 #include "io/is_file.h"
+#include "tilt_series/contradictions.h"
+#include "tilt_series/series_plan.h"
 #include "tomofield/error.h"
 
 namespace tomofield::projects {
@@ -24,10 +27,9 @@ bool is_stack(const fs::path& path) {
   }
 }
 
-// Headers have 0, or 1 of programs that do not know the size.
-bool is_known_size(double in_header_A) { return in_header_A != 0.0 && in_header_A != 1.0; }
-
 }  // namespace
+
+bool is_known_size(double in_header_A) { return in_header_A != 0.0 && in_header_A != 1.0; }
 
 std::optional<fs::path> find_stack_beside(const fs::path& file, const std::string& named) {
   fs::path stem = file;
@@ -55,6 +57,21 @@ void set_stated_pixel_size(Project& project, const StatedPixelSize& stated, doub
                     "latter is taken (give the right size with --pixel-size)",
                     stated.file.string(), stated.size_A, stated.entry, in_header_A));
   }
+}
+
+void warn_of_other_rotation(Project& project, const fs::path& file, const std::string& entry,
+                            double angle_deg) {
+  const auto value_of = [&](std::string_view option) {
+    const auto found = std::ranges::find(project.settings(), option, &Setting::option);
+    return found == project.settings().end() ? std::string() : found->value;
+  };
+  const std::string xf = value_of("--xf");
+  if (xf.empty() || project.ignores(entry)) return;
+  const double axis_deg =
+      tilt_series::axis_of_transforms(xf, *io::open_image_stack(value_of("stack")));
+  const tilt_series::StatedAxis stated{angle_deg, fmt::format("{} of '{}'", entry, file.string())};
+  if (const auto found = tilt_series::contradiction_of_axis(stated, axis_deg, xf))
+    project.warn(*found);
 }
 
 }  // namespace tomofield::projects

@@ -22,6 +22,9 @@ struct StatedPixelSize {
   double size_A = 0.0;
 };
 
+/// Tells whether the pixel size of a header is one. Programs that do not know it write 0, or 1.
+bool is_known_size(double in_header_A);
+
 /// Sets --pixel-size to what a file states if the header of the stack has no size (`in_header_A` is
 /// 0 or 1). Warns if both differ by more than a tenth, which no calibration changes.
 void set_stated_pixel_size(Project& project, const StatedPixelSize& stated, double in_header_A);
@@ -29,5 +32,10 @@ void set_stated_pixel_size(Project& project, const StatedPixelSize& stated, doub
 /// Returns whether the header of a stack has other pixels than those that are stated, and not only
 /// another calibration. A header without a size has not.
 bool are_other_pixels(double stated_A, double in_header_A);
+
+/// Warns if the transforms that the project applies (--xf) turn the views of its stack by another
+/// tilt axis than the one that an entry states. Does nothing without transforms.
+void warn_of_other_rotation(Project& project, const std::filesystem::path& file,
+                            const std::string& entry, double angle_deg);
 
 }  // namespace tomofield::projects

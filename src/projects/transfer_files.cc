@@ -181,6 +181,21 @@ void set_imod_pixel_size(Project& project, const CtfCommands& commands, const St
                         pixels.in_header_A);
 }
 
+// Compares the tilt axis that a command states with that of the alignment.
+void compare_axis(Project& project, const CtfCommand& command) {
+  for (const io::CommandEntry& entry : command.entries) {
+    if (lower_case(entry.name) != "axisangle" || project.ignores(entry.name)) continue;
+    const auto axis_deg = io::parse_number(entry.value, base::kLargestAngle_deg);
+    if (!axis_deg)
+      throw Error(fmt::format(
+          "'{}', line {}: '{} {}' is no angle of a tilt axis: correct it, or "
+          "go on with --ignore {}",
+          command.file.string(), entry.line, entry.name, io::quote(entry.value), entry.name));
+    project.add_file(command.file);
+    warn_of_other_rotation(project, command.file, entry.name, *axis_deg);
+  }
+}
+
 // Warns of what changes the contrast transfer and is not applied. The phase shifts that count are
 // those of the .defocus file.
 void warn_of_other_transfer(Project& project, const CtfCommand& command) {
@@ -218,6 +233,7 @@ void set_imod_optics(Project& project, const fs::path& tilt_com, const StackPixe
   const CtfCommands commands(tilt_com);
   set_microscope(project, commands, has_transfer);
   set_imod_pixel_size(project, commands, pixels);
+  compare_axis(project, commands.plotter);
   if (!has_transfer) return;
   for (const CtfCommand* command : commands.all()) warn_of_other_transfer(project, *command);
 }

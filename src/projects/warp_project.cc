@@ -3,9 +3,28 @@
 #include "io/images/view_images.h"
 #include "io/tables/view_table.h"
 #include "projects/formats.h"
+#include "projects/stacks.h"
 #include "projects/transfer_files.h"
 
 namespace tomofield::projects {
+
+namespace {
+
+// Sets the pixel size, which the XML file states for the contrast transfer, if the images have
+// none. Returns the one that counts in Å; 0 if there is none.
+double set_pixel_size(Project& project, const io::ViewTable& table) {
+  constexpr const char* kEntry = "PixelSize";
+  const double in_header_A = io::open_image_stack(table.file)->header().voxel_size_A[0];
+  const auto stated_A = table.optics.pixel_size_A;
+  if (!stated_A || project.ignores(kEntry)) return in_header_A;
+  const bool is_known = is_known_size(in_header_A);
+  // Beside a contrast transfer, the size for which its defocus holds is compared there.
+  if (!is_known || !io::has_defocus(table))
+    set_stated_pixel_size(project, {table.file, kEntry, *stated_A}, in_header_A);
+  return is_known ? in_header_A : *stated_A;
+}
+
+}  // namespace
 
 void read_warp_project(Project& project) {
   const std::filesystem::path path = project.request().path;
@@ -22,9 +41,8 @@ void read_warp_project(Project& project) {
   } else {
     warn_of_unused_transfer(project, table);
   }
-  if (!table.thickness_A) return;
-  const double pixel_A = io::open_image_stack(path)->header().voxel_size_A[0];
-  if (pixel_A > 0) {
+  const double pixel_A = set_pixel_size(project, table);
+  if (table.thickness_A && pixel_A > 0) {
     project.set("--thickness", fmt::format("{:.0f}", *table.thickness_A / pixel_A), path,
                 "VolumeDimensionsAngstrom");
   }

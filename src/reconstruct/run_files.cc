@@ -28,10 +28,11 @@ void add_half_files(const output::OutputPaths& paths, bool with_linear_volumes,
 }
 
 // Says whether the run resumes. Without a checkpoint there is nothing to resume: then the other
-// files are from another run.
+// files are from another run, unless a run was killed here before its first checkpoint.
 bool can_resume(const options::ReconstructOptions& options, const output::OutputPaths& paths) {
   const auto has = [](const std::filesystem::path& file) { return std::filesystem::exists(file); };
-  return options.run.resume && (has(paths.model) || (options.fit.tune && has(paths.trials)) ||
+  return options.run.resume && (has(paths.model) || io::has_lock_file(paths.volume) ||
+                                (options.fit.tune && has(paths.trials)) ||
                                 (options.run.align != Alignment::kOff && has(paths.alignment)) ||
                                 (options.may_use_tiles() && has(paths.tiles)));
 }

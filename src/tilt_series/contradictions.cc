@@ -134,16 +134,23 @@ void warn_of_two_axes(const StatedAxis& used, const std::optional<StatedAxis>& o
                   used.source, used.angle_deg, other->source, other->angle_deg));
 }
 
+std::optional<std::string> contradiction_of_axis(const StatedAxis& stated, double aligned_axis_deg,
+                                                 const std::string& alignment) {
+  const double difference_deg = angle_between_axes(stated.angle_deg, aligned_axis_deg);
+  if (difference_deg <= kLargestAxisChange_deg) return std::nullopt;
+  const bool is_opposite = difference_deg >= 180.0 - kLargestAxisChange_deg;
+  return fmt::format("'{}' turns the views by a tilt axis of {:.1f}°, and {} states {:.1f}°: {}",
+                     alignment, aligned_axis_deg, stated.source, stated.angle_deg,
+                     is_opposite ? "one of the two makes a tomogram that is mirrored in z"
+                                 : "are they of one series?");
+}
+
 void warn_of_other_axis(const StatedAxis& stated, double aligned_axis_deg,
                         const TiltSeriesOptions& options, const io::ImageStack& stack) {
-  const double difference_deg = angle_between_axes(stated.angle_deg, aligned_axis_deg);
-  if (stated.is_given || difference_deg <= kLargestAxisChange_deg) return;
-  const bool is_opposite = difference_deg >= 180.0 - kLargestAxisChange_deg;
-  base::log_warning(fmt::format(
-      "'{}' turns the views by a tilt axis of {:.1f}°, and {} states {:.1f}°: {}",
-      name_of_alignment(options, stack), aligned_axis_deg, stated.source, stated.angle_deg,
-      is_opposite ? "one of the two makes a tomogram that is mirrored in z"
-                  : "are they of one series?"));
+  if (stated.is_given) return;
+  const std::string alignment = name_of_alignment(options, stack);
+  if (const auto found = contradiction_of_axis(stated, aligned_axis_deg, alignment))
+    base::log_warning(*found);
 }
 
 void warn_of_turned_views(const Angles& axes_deg, double mean_deg, const TiltSeriesOptions& options,

@@ -40,6 +40,11 @@ void warn_of_other_nominal_angles(const SectionTable& table);
 /// Warns if another file states another tilt axis than the one that is used.
 void warn_of_two_axes(const StatedAxis& used, const std::optional<StatedAxis>& other);
 
+/// Says that an alignment (a file, for messages) turns the views by another axis than the one that
+/// is stated. Returns nothing if it does not.
+std::optional<std::string> contradiction_of_axis(const StatedAxis& stated, double aligned_axis_deg,
+                                                 const std::string& alignment);
+
 /// Warns if an alignment turns the views by another axis than the one that a file states.
 void warn_of_other_axis(const StatedAxis& stated, double aligned_axis_deg,
                         const TiltSeriesOptions& options, const io::ImageStack& stack);

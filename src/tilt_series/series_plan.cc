@@ -18,6 +18,7 @@
 #include "io/tables/view_table.h"
 #include "tilt_series/contradictions.h"
 #include "tilt_series/local/file_motion.h"
+#include "tilt_series/pixel_size.h"
 #include "tilt_series/resampling/binning.h"
 #include "tilt_series/section_table.h"
 #include "tilt_series/tilt_angles.h"
@@ -137,59 +138,6 @@ std::optional<SectionTable> find_section_table(const TiltSeriesOptions& options,
   return sections_of_views(io::read_view_table(options.stack), stack, pixel_size_A);
 }
 
-/// Returns the pixel size that an .mdoc states for the images of a stack, or 0. Its PixelSpacing is
-/// that of images of ImageSize, which may be binned records of these.
-double pixel_size_of_mdoc(const io::Mdoc& mdoc, const std::filesystem::path& path,
-                          const io::ImageStack& stack) {
-  const double spacing_A = mdoc.pixel_spacing_A.value_or(0.0);
-  if (!base::is_plausible_pixel_size(spacing_A)) return 0.0;
-  if (!mdoc.image_size_px) return spacing_A;
-  const auto [width, height] = *mdoc.image_size_px;
-  const auto ratio = [](std::int64_t a, std::int64_t b) {
-    return static_cast<double>(a) / static_cast<double>(b);
-  };
-  const double across = ratio(stack.header().nx, width), along = ratio(stack.header().ny, height);
-  // Cameras leave out a few rows or columns where they bin.
-  constexpr double kSame = 0.02;
-  const double whole = across >= 1.0 ? std::round(across) : 1.0 / std::round(1.0 / across);
-  if (std::fabs(across / whole - 1.0) < kSame && std::fabs(along / whole - 1.0) < kSame)
-    return spacing_A / whole;
-  base::log_warning(
-      fmt::format("'{}' states pixels of {} Å for images of {} × {}, and those of '{}' have {} × "
-                  "{}: {} Å is taken (give the right size with --pixel-size)",
-                  path.string(), spacing_A, width, height, stack.name(), stack.header().nx,
-                  stack.header().ny, spacing_A));
-  return spacing_A;
-}
-
-/// Returns the facts of a stack that is an MRC file.
-std::optional<io::MrcFacts> facts_of(const TiltSeriesOptions& options,
-                                     const io::ImageStack& stack) {
-  if (stack.is_in_memory()) return std::nullopt;
-  return io::find_mrc_facts(options.stack, stack.header());
-}
-
-/// Returns what is wrong with the pixel size of a header that has no usable one.
-std::string fault_of_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& stack) {
-  const auto facts = facts_of(options, stack);
-  if (!facts || (facts->voxel_size_A[0] == 0.0 && facts->voxel_size_A[1] == 0.0))
-    return "has no pixel size";
-  return fmt::format("states pixels of {:.6g} × {:.6g} Å, which cannot be", facts->voxel_size_A[0],
-                     facts->voxel_size_A[1]);
-}
-
-/// Throws Error unless the pixels of a stack are square, or none of their sides is known.
-void require_square_pixels(const io::ImageStack& stack) {
-  const auto& [width_A, height_A, depth_A] = stack.header().voxel_size_A;
-  if (!(std::fabs(width_A - height_A) > 0.001 * std::fabs(std::max(width_A, height_A)))) return;
-  throw Error(
-      fmt::format("'{}' has pixels of {:.6g} × {:.6g} Å{}, and only square ones can be "
-                  "reconstructed: give their size "
-                  "with --pixel-size if the header is wrong",
-                  stack.name(), width_A, height_A,
-                  std::min(width_A, height_A) == 0.0 ? " (0: none, or one that cannot be)" : ""));
-}
-
 void require_whole_images(const io::ImageStack& stack) {
   if (!stack.header().has_pieces) return;
   throw Error(fmt::format(
@@ -205,52 +153,6 @@ void warn_of_sections_beyond(const TiltSeriesOptions& options, const io::ImageSt
       "'{}' is longer than its header states: after the {} sections there is room for {} more, "
       "which are not read (is the header right?)",
       stack.name(), stack.header().nz, facts->sections_beyond));
-}
-
-/// Warns if an .mdoc states another size than the header of its stack. Stacks are often binned by a
-/// whole number, and the sizes of headers are often calibrated.
-void warn_of_other_size(const io::Mdoc& mdoc, const std::filesystem::path& path,
-                        const io::ImageStack& stack) {
-  constexpr double kCalibration = 0.1;
-  const double in_header_A = stack.header().voxel_size_A[0];
-  if (mdoc.pixel_spacing_A.value_or(0.0) == 0.0) return;  // not known
-  const double ratio = in_header_A / *mdoc.pixel_spacing_A;
-  if (std::fabs(ratio / std::max(1.0, std::round(ratio)) - 1.0) < kCalibration) return;
-  base::log_warning(
-      fmt::format("'{}' states pixels of {:.6g} Å, and '{}' of {:.6g} Å: the latter is taken (give "
-                  "the right size with --pixel-size)",
-                  path.string(), *mdoc.pixel_spacing_A, stack.name(), in_header_A));
-}
-
-/// Returns the size of an unbinned pixel in Å: --pixel-size, else the header's, else the mdoc's.
-double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& stack,
-                       const std::optional<io::Mdoc>& mdoc) {
-  if (options.pixel_size_A) {
-    if (base::is_plausible_pixel_size(*options.pixel_size_A)) return *options.pixel_size_A;
-    throw Error(fmt::format("the pixel size {} Å (--pixel-size) is not from {} to {} Å",
-                            *options.pixel_size_A, base::kPixelSizes_A.low(),
-                            base::kPixelSizes_A.high()));
-  }
-  require_square_pixels(stack);
-  const double in_header_A = stack.header().voxel_size_A[0];
-  const bool is_default = in_header_A == 0.0 || in_header_A == 1.0;
-  if (is_default && mdoc) {
-    const double stated_A = pixel_size_of_mdoc(*mdoc, *options.mdoc, stack);
-    if (stated_A > 0.0) return stated_A;
-  }
-  if (in_header_A > 0.0 && !is_default) {
-    if (mdoc) warn_of_other_size(*mdoc, *options.mdoc, stack);
-    return in_header_A;
-  }
-  if (stack.is_in_memory()) {
-    if (in_header_A > 0.0) return in_header_A;
-    throw Error("views in memory have no pixel size: give it in Å with --pixel-size");
-  }
-  base::log_warning(fmt::format(
-      "'{}' {}; 1 Å is assumed (give it with --pixel-size)", stack.name(),
-      in_header_A == 0.0 ? fault_of_pixel_size(options, stack)
-                         : "states pixels of 1 Å, as programs write that do not know their size"));
-  return 1.0;
 }
 
 double find_bin_factor(const TiltSeriesOptions& options, const SeriesPlan& plan) {
@@ -371,6 +273,10 @@ std::array<std::int64_t, 2> aligned_size(const std::filesystem::path& xf,
   return aligned_size(alignment_of_imod(xf, stack), stack.header());
 }
 
+double axis_of_transforms(const std::filesystem::path& xf, const io::ImageStack& stack) {
+  return alignment_of_imod(xf, stack).axis_deg();
+}
+
 SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& stack) {
   require_compatible(options);
   const io::MrcHeader& header = stack.header();
@@ -412,6 +318,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
       warn_of_given_axis(*options.tilt_axis_deg, axis_of_files(options, stack, table, mdoc));
     if (options.starts_raw && !axis && !alignment) warn_of_unknown_axis(stack);
     warn_of_sections_beyond(options, stack);
+    warn_of_headers(options, stack);
   }
 
   plan.angle_source = angles.source;

@@ -75,6 +75,9 @@ struct SeriesPlan {
 std::array<std::int64_t, 2> aligned_size(const std::filesystem::path& xf,
                                          const io::ImageStack& stack);
 
+/// Returns the mean tilt axis that IMOD's transforms undo, counter-clockwise from +Y.
+double axis_of_transforms(const std::filesystem::path& xf, const io::ImageStack& stack);
+
 /// Brings the options, the files that they name and the stack together.
 /// Throws Error where they do not fit each other or cannot be right.
 SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& stack);

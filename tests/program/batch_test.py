@@ -659,6 +659,30 @@ def test_files_of_others_in_the_folder_of_a_batch_stay(data):
         harness.succeed(*command, "--overwrite", "--slurm", env=fake_sbatch(folder, "55\\n"))
 
 
+def test_tasks_of_another_batch_in_the_folder_make_nothing(data):
+    folder = harness.fresh_directory("waiting")
+    results = os.path.join(folder, "results")
+
+    def submit(name, *more):
+        said = harness.succeed("batch", os.path.join(data, name), *pattern(data)[1:], *QUICK, "--slurm",
+                               "-o", results, *more, env=fake_sbatch(folder, "55\\n"))
+        script = os.path.join(folder, f"{name}.sbatch")
+        shutil.copy(os.path.join(results, "batch.sbatch"), script)  # as Slurm keeps it
+        return said, script
+
+    def run_task(script):
+        return subprocess.run(["sh", script], env={**os.environ, "SLURM_ARRAY_TASK_ID": "1"},
+                              capture_output=True, text=True, timeout=300, check=False)
+
+    _, first = submit("a.mrc")
+    said, second = submit("b.mrc")
+    assert "has not finished a:" in said.stderr, said.stderr
+    task = run_task(first)
+    assert task.returncode == 2 and "list of another batch" in task.stderr, task.stderr
+    assert not os.path.exists(os.path.join(results, "b.mrc"))
+    assert run_task(second).returncode == 0 and os.path.exists(os.path.join(results, "b.mrc"))
+
+
 @pytest.mark.parametrize("answer, number", [
     ("note\\n55;cluster\\nsbatch: more\\n", "55"), ("queued\\n", None), ("0\\n", None),
     ("99999999999999999999999\\n", None), ("4294967296\\n", None), ("\\0\\0\\n", None)])

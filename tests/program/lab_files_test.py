@@ -358,6 +358,8 @@ def test_a_dataset_of_etomo():
     write(folder, "TS_01.edf", edf_text + "Setup.AxisA.ExcludeProjections=3,5-6\nSetup.PixelSize=0.5\n")
     expect(harness.succeed("info", ".", cwd=folder).stdout, "--xf ./TS_01.xf")
     expect(dry(folder, "TS_01.edf"), "--exclude 3,5-6", "states pixels of 5 Å")
+    write(folder, "TS_01.edf", edf_text + "Setup.ImageRotationA=5.3\n")
+    expect(dry(folder, "TS_01.edf"), "TS_01.xf' turns the views", "85.3°", "Setup.ImageRotationA", "5.3°")
     write(folder, "TS_01.edf", "Setup.DatasetName=TS_01\nSetup.AxisType=Dual Axis\n")
     expect(dry(folder, "TS_01.edf", status=2), "two axes", "tilta.com")
     os.remove(os.path.join(folder, "TS_01.st"))

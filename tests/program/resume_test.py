@@ -235,6 +235,20 @@ def test_resume_without_a_checkpoint_starts_from_the_beginning(command, undistur
     assert read_bytes(results.volume_path) == b"another volume"
 
 
+def test_what_a_killed_run_leaves_before_its_first_checkpoint_is_replaced(command, undisturbed):
+    """A run that chooses by trials draws their pictures before its first checkpoint."""
+    results = harness.fresh_results("killed_early")
+    with open(results.pictures["xy"], "w", encoding="ascii") as file:
+        file.write("a picture")
+    said = harness.tomofield(*command(results, "--resume"))
+    assert said.returncode == 2 and "no checkpoint to resume" in said.stderr, said.stderr
+    folder, name = os.path.split(results.volume_path)
+    with open(os.path.join(folder, f".{name}.tomofield-lock"), "w", encoding="ascii") as file:
+        file.write("process 1 on another machine since yesterday")
+    harness.succeed(*command(results, "--resume"))
+    assert results.same_as(undisturbed) and not results.leftovers()
+
+
 def test_resume_of_a_finished_run_writes_the_same_results(command, undisturbed):
     results = harness.fresh_results("finished")
     harness.succeed(*command(results))

@@ -5,6 +5,7 @@ import io
 import json
 import os
 import re
+import shlex
 
 import mrcfile
 import numpy as np
@@ -42,6 +43,14 @@ class Series:
     def read(self, name):
         with mrcfile.open(self.path(name)) as file:
             return file.data.astype(np.float64)
+
+
+def test_the_command_that_reconstructs_has_quoted_names():
+    folder = harness.fresh_directory("quoted")
+    name = "it's; touch made #"
+    said = harness.succeed("simulate", name, "--size", 48, "--thickness", 24, "--tilts=-60:60:20", cwd=folder)
+    command = said.stdout.split("reconstruct it with: ")[1].splitlines()[0]
+    assert shlex.split(command, comments=True)[2] == os.path.join(name, "tilt_series.mrc"), command
 
 
 def test_truth_and_projections_are_those_of_the_recorded_ellipsoids():

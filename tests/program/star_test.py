@@ -3,8 +3,10 @@
 import json
 import os
 import pathlib
+import shutil
 
 import harness
+import mrcfile
 import numpy as np
 import pytest
 import star_projects
@@ -285,3 +287,43 @@ def test_series_of_warp(series, plain):
         volumes.append(harness.read_volume(output))
     np.testing.assert_array_equal(*volumes)
     assert agreement(volumes[0], plain.volume) > 0.97
+
+
+def test_no_result_replaces_an_image_that_a_table_lists(series, plain):
+    folder = harness.fresh_directory("listed_images")
+    star = star_projects.write_relion(folder, series)
+    table = os.path.join(folder, "Tomograms/job009/tilt_series/TS_02.star")
+    images = os.path.join(folder, "stacks/TS_02.mrcs")
+    other = os.path.join(os.path.dirname(table), "TS_01.mrc")
+    volume = os.path.join(folder, "volume.mrc")
+    shutil.copy(plain.volume_path, volume)
+    for words in (["evaluate", volume, "--series", table, "--contrast", "bright",
+                   "--no-margin", "--json", images],
+                  ["reconstruct", star, "--series", "TS_02", *QUICK, "-o", other]):
+        said = harness.tomofield(*words, "--overwrite", cwd=folder)
+        assert said.returncode == 2 and "would replace the input" in said.stderr, said.stderr
+
+
+def test_the_pixel_size_of_warp_counts_where_its_averages_have_none(series):
+    folder = harness.fresh_directory("warp_pixels")
+    _, xml = star_projects.write_warp(folder, series)
+    with open(xml, encoding="utf-16") as file:
+        text = file.read()
+    with open(xml, "w", encoding="utf-16") as file:
+        file.write(text.replace("</TiltSeries>", '<CTF><Param Name="PixelSize" Value="5" /></CTF></TiltSeries>'))
+    assert "--pixel-size" not in harness.succeed("info", xml, cwd=folder).stdout
+    averages = os.path.join(folder, "warp_frameseries/average")
+    for name in os.listdir(averages):
+        with mrcfile.open(os.path.join(averages, name), "r+") as file:
+            file.voxel_size = 0
+    printed = harness.succeed("info", xml, cwd=folder).stdout
+    assert "--pixel-size 5 from" in printed, printed
+
+
+def test_oblong_images_beside_a_pixel_size_of_relion_are_named(series):
+    folder = harness.fresh_directory("oblong")
+    star = star_projects.write_relion(folder, series)
+    with mrcfile.open(os.path.join(folder, "stacks/TS_02.mrcs"), "r+") as file:
+        file.voxel_size = (PIXEL_SIZE, 2 * PIXEL_SIZE, 1)
+    shown = harness.succeed("reconstruct", star, "--series", "TS_02", "--dry-run", cwd=folder)
+    assert "square ones of" in shown.stderr, shown.stderr

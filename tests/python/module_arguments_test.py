@@ -205,6 +205,8 @@ def test_numbers_and_paths_of_every_kind_are_taken(series, model):
     assert tomofield.score_volume(whole, whole).correlation == pytest.approx(1)
     assert tomofield.score_volume(list(whole), Holder(whole)).correlation == pytest.approx(1)
     assert len(tomofield.Tomogram(whole, 1.0)) == 8
+    listed = tomofield.Tomogram([[[1.0, 2.0]], [[3.0, 4.0]]], 1.0)
+    assert listed.shape == (2, 1, 2) and listed.section().shape == (1, 2)
 
 
 def set_options(**options):

@@ -51,6 +51,7 @@ struct BatchArguments {
   int at_once = kMostSeries;
   batch::Choose choose = batch::Choose::kOnce;
   std::optional<int> task;
+  std::optional<std::int64_t> began_ns;
   std::vector<std::string> sbatch;
 };
 
@@ -194,6 +195,7 @@ std::string script_for(const BatchArguments& arguments, const batch::JobList& li
   return slurm_script({.program = base::program_path(),
                        .folder = arguments.folder,
                        .threads = threads,
+                       .began_ns = list.began_ns,
                        .more = arguments.sbatch},
                       list.jobs);
 }
@@ -213,6 +215,7 @@ void run_by_slurm(const BatchArguments& arguments, const batch::JobList& list,
 void run_task(const CLI::App& command, const BatchArguments& arguments) {
   stop_on_signals(/*is_job=*/true);  // Slurm sends SIGUSR1 before the time limit
   batch::JobList list = batch::read_jobs(arguments.list);
+  require_same_batch(arguments.list, list, arguments.began_ns);
   const batch::RunOptions options = run_options(arguments.folder);
   const int threads = threads_of(command, arguments);
   if (*arguments.task == batch::kChoosingTask) {
@@ -294,6 +297,10 @@ void add_slurm_options(CLI::App& command, BatchArguments& arguments) {
           ""))
       ->group(group);
   command
+      .add_option("--began", arguments.began_ns,
+                  "With --task: when the batch began whose list it is, as batch.json states it")
+      ->group(kHelpAllGroup);
+  command
       .add_option("--task", arguments.task,
                   "Run one series of the list batch.json, from 1; 0 chooses for all series")
       ->check(number_between(0, kMostSeries))
@@ -335,8 +342,9 @@ std::vector<std::string> add_own_options(CLI::App& command, BatchArguments& argu
       ->default_str("once")
       ->group(group);
   add_slurm_options(command, arguments);
-  return {"LIST",      "--output", "--skip-existing", "--resume", "--overwrite", "--dry-run",
-          "--at-once", "--choose", "--slurm",         "--sbatch", "--task",      "--threads"};
+  return {"LIST",      "--output",  "--skip-existing", "--resume", "--overwrite",
+          "--dry-run", "--at-once", "--choose",        "--slurm",  "--sbatch",
+          "--began",   "--task",    "--threads"};
 }
 
 }  // namespace

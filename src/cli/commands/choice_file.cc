@@ -9,6 +9,7 @@
 #include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
+#include "io/saving/output_files.h"
 #include "option_table/setting.h"
 #include "reconstruct/reconstruct.h"
 
@@ -34,6 +35,7 @@ void add_batch_choice_option(CLI::App& command, std::optional<std::filesystem::p
 
 void note_choice_of_batch(const CLI::App& command, const std::filesystem::path& file,
                           option_table::Choices& choices) {
+  io::add_input(file);
   std::vector<Setting> settings;
   for (const option_table::GivenOption& given : given_options(command, {})) {
     if (!given.value || !batch::is_shared(given.flag)) continue;

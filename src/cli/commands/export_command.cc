@@ -157,6 +157,7 @@ void write_compact(const ExportArguments& arguments) {
       [&](const compact::CodedField& coded) { return output::coded_file_size(coded, model); });
   model.field = std::move(made.field);
   model.coded = std::move(made.coded);
+  const std::size_t num_bytes = output::coded_file_size(*model.coded, model);
   io::OutputSet results;
   output::save_model(arguments.compact, model);
   results.commit();
@@ -164,8 +165,7 @@ void write_compact(const ExportArguments& arguments) {
       "{}: {} parameters in {} leaves, {} bytes; the densities change by {:.4g} times their "
       "standard deviation\n",
       arguments.compact.string(), made.report.parameters, model.field->tree().num_leaves(),
-      std::filesystem::file_size(arguments.compact),
-      std::sqrt(made.report.mean_square_change / made.report.variance));
+      num_bytes, std::sqrt(made.report.mean_square_change / made.report.variance));
 }
 
 void export_volume(const ExportArguments& arguments, const Model& model) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/code_text.h"
 #include "cli/commands/commands.h"
 #include "cli/options/common_options.h"
 #include "cli/options/number_checks.h"
@@ -134,7 +135,9 @@ void resolve_specimen(SimulateArguments& arguments) {
 /// Returns the command that reconstructs the series.
 std::string how_to_reconstruct(const std::filesystem::path& directory,
                                const simulate::SimulationOptions& options) {
-  const auto file = [&](const char* name) { return (directory / name).string(); };
+  const auto file = [&](const char* name) {
+    return base::Shell::quoted_if_needed((directory / name).string());
+  };
   std::string more = options.cell.is_extended ? "" : " --no-margin";
   if (options.is_physical())
     more +=

@@ -10,6 +10,7 @@
 #include "cli/options/number_checks.h"
 #include "cli/options/place_options.h"
 #include "cli/options/table_options.h"
+#include "evaluate/matching/picks.h"
 #include "io/saving/output_files.h"
 #include "output/output_paths.h"
 #include "tomofield/error.h"
@@ -158,11 +159,16 @@ std::vector<io::OutputLock> EvaluateArguments::claim_outputs() const {
   Options series_options = choices.options;
   series_options.specimen.thickness = 1;  // the volume has its own
   base::require_no_faults(option_table::range_faults(series_options));
-  std::vector<std::filesystem::path> inputs = io::input_files(choices.files), outputs;
+  SeriesFiles files = choices.files;
+  if (series) files.stack = *series;
+  std::vector<std::filesystem::path> inputs = io::input_files(files), outputs;
   inputs.push_back(volume);
   if (!model) inputs.push_back(output::output_paths(volume).model);
-  for (const auto& file : {truth, fsc_with, fsc_mask, membranes, particles, series, model})
+  for (const auto& file : {truth, fsc_with, fsc_mask, membranes, particles, model})
     if (file) inputs.push_back(*file);
+  if (particles)
+    for (const std::string& kind : evaluate::particle_kinds(*particles))
+      inputs.push_back(evaluate::density_of(*particles, kind));
   for (const auto& file : {json, fsc_csv, fsc_picture, profile_csv})
     if (file) outputs.push_back(*file);
   return io::claim_outputs(outputs, [&] {

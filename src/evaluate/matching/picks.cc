@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/utf8.h"
 #include "evaluate/box.h"
@@ -20,6 +21,7 @@ using Position = std::array<double, 3>;
 
 constexpr double kSearchVoxel_A = 20.0;
 constexpr int kRotations = 96;
+constexpr const char* kKind = "tomofieldParticleKind";
 
 double squared_distance(const Position& a, const Position& b) {
   double sum = 0.0;
@@ -91,22 +93,39 @@ std::vector<Detection> judge(const std::vector<Pick>& picks, const std::vector<P
   return detections;
 }
 
+// Returns the table of the particles in a list.
+io::StarTable read_table(const std::filesystem::path& list) {
+  const std::vector<io::StarTable> tables = io::read_star_file(list);
+  if (const io::StarTable* table = io::find_table(tables, kKind)) return *table;
+  throw Error(fmt::format("'{}' has no column _{}: give the particles.star of simulate",
+                          list.string(), kKind));
+}
+
 }  // namespace
 
+std::filesystem::path density_of(const std::filesystem::path& list, const std::string& kind) {
+  return list.parent_path() / fmt::format("particle_{}.mrc", kind);
+}
+
+std::vector<std::string> particle_kinds(const std::filesystem::path& list) {
+  std::vector<std::string> kinds;
+  const io::StarTable table = read_table(list);
+  for (std::size_t row = 0; row < table.num_rows(); ++row) {
+    std::string kind = io::StarRow(list, table, row).text(kKind);
+    if (std::ranges::find(kinds, kind) == kinds.end()) kinds.push_back(std::move(kind));
+  }
+  return kinds;
+}
+
 std::vector<ParticleReference> read_particles(const std::filesystem::path& list) {
-  const std::vector<io::StarTable> tables = io::read_star_file(list);
-  const io::StarTable* table = io::find_table(tables, "tomofieldParticleKind");
-  if (table == nullptr)
-    throw Error(fmt::format(
-        "'{}' has no column _tomofieldParticleKind: give the particles.star of simulate",
-        list.string()));
+  const io::StarTable table = read_table(list);
   std::vector<ParticleReference> references;
-  for (std::size_t row = 0; row < table->num_rows(); ++row) {
-    const io::StarRow values(list, *table, row);
-    const std::string kind = values.text("tomofieldParticleKind");
+  for (std::size_t row = 0; row < table.num_rows(); ++row) {
+    const io::StarRow values(list, table, row);
+    const std::string kind = values.text(kKind);
     auto reference = std::ranges::find(references, kind, &ParticleReference::kind);
     if (reference == references.end()) {
-      const auto file = list.parent_path() / fmt::format("particle_{}.mrc", kind);
+      const auto file = density_of(list, kind);
       reference = references.insert(references.end(), {kind, read_volume(file), {}});
       const base::Shape3& n = reference->density.shape;
       if (n.nx != n.ny || n.ny != n.nz || n.nx % 2 != 0)

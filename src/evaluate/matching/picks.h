@@ -16,6 +16,13 @@ struct ParticleReference {
   std::vector<std::array<double, 3>> positions_px;  ///< voxel i covers [i, i + 1)
 };
 
+/// Returns the kinds of particles in a list, in the order in which they occur first. Throws Error
+/// for a list without them.
+std::vector<std::string> particle_kinds(const std::filesystem::path& list);
+
+/// Returns the file of the density of a kind, particle_KIND.mrc beside the list.
+std::filesystem::path density_of(const std::filesystem::path& list, const std::string& kind);
+
 /// Reads a list of particles as `simulate --yardstick d` writes it, and the densities beside it,
 /// particle_KIND.mrc, in the order in which kinds occur in the list. Throws Error with the file for
 /// what is missing.

@@ -1,5 +1,7 @@
 #include "io/images/mrc_extended.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -19,6 +21,8 @@ namespace {
 constexpr std::size_t kFirstShort = 128, kSecondShort = 130;
 constexpr double kLargestTilt_deg = 180.0;
 constexpr double kAngstroms_in_m = 1e10;
+constexpr double kSamePixel = 0.02;  // of calibrations
+constexpr std::string_view kPixelsInA = "pixels in Å";
 
 // Returns the number at an offset in a file of either byte order.
 template <typename T>
@@ -50,9 +54,27 @@ void take_tilts(std::vector<double> tilts_deg, MrcHeader& header) {
 }
 
 void take_pixel_size(double width_A, double height_A, MrcHeader& header) {
+  if (!base::is_plausible_pixel_size(width_A)) return;
+  header.extended_pixel_A = width_A;
   const bool has_one = header.voxel_size_A[0] != 0.0 && header.voxel_size_A[0] != 1.0;
-  if (has_one || !base::is_plausible_pixel_size(width_A)) return;
+  if (has_one) return;
   header.voxel_size_A = {width_A, height_A, width_A};
+}
+
+// Notes the first section in which the extended header states another value than in the first one.
+// `of_section(i)` returns the value, or nothing.
+template <typename OfSection>
+void note_difference(std::string_view what, const OfSection& of_section, double tolerance,
+                     MrcHeader& header) {
+  const std::optional<double> first = of_section(0);
+  for (std::int64_t section = 1; section < header.nz && first; ++section) {
+    const std::optional<double> other = of_section(section);
+    if (!other || !(std::fabs(*other - *first) > tolerance)) continue;
+    header.extended_difference =
+        fmt::format("{} of {:.6g} in section {}, and of {:.6g} in the first", what, *other,
+                    section + 1, *first);
+    return;
+  }
 }
 
 void take_axis(double axis_deg, MrcHeader& header) {
@@ -101,9 +123,12 @@ void read_floats(std::span<const std::byte> extended, const ExtendedRecords& rec
   if (records.num_floats <= kPixel) return;
   take_axis(records.is_fei ? -value(0, kAxis) : value(0, kAxis), header);
   constexpr double kSmallest_A = 0.05;  // a smaller number is in metres
-  const double pixel = value(0, kPixel);
-  const double pixel_A = pixel > kSmallest_A ? pixel : kAngstroms_in_m * pixel;
-  take_pixel_size(pixel_A, pixel_A, header);
+  const auto pixel_A = [&](std::int64_t section) {
+    const double pixel = value(section, kPixel);
+    return pixel > kSmallest_A ? pixel : kAngstroms_in_m * pixel;
+  };
+  take_pixel_size(pixel_A(0), pixel_A(0), header);
+  note_difference(kPixelsInA, pixel_A, kSamePixel * std::fabs(pixel_A(0)), header);
 }
 
 // One record of FEI1 or FEI2.
@@ -159,16 +184,19 @@ class FeiRecord {
 
 void read_fei(std::span<const std::byte> extended, MrcHeader& header) {
   std::vector<double> tilts_deg;
-  for (std::size_t at = 0; std::ssize(tilts_deg) < header.nz;) {
+  std::vector<FeiRecord> records;
+  for (std::size_t at = 0; std::ssize(records) < header.nz;) {
     if (at + FeiRecord::kSmallest > extended.size()) return;
     const FeiRecord record(extended.subspan(at), header.is_byte_swapped);
     const auto tilt_deg = record.tilt_deg();
     if (!tilt_deg || record.size() < FeiRecord::kSmallest) return;
     tilts_deg.push_back(*tilt_deg);
+    records.push_back(record);
     at += static_cast<std::size_t>(record.size());
   }
+  if (records.empty()) return;
   take_tilts(std::move(tilts_deg), header);
-  const FeiRecord first(extended, header.is_byte_swapped);
+  const FeiRecord& first = records.front();
   if (const auto width_A = first.pixel_width_A())
     take_pixel_size(*width_A, first.pixel_height_A().value_or(*width_A), header);
   constexpr base::Interval kVoltages_V{2e4, 3e6};
@@ -176,6 +204,16 @@ void read_fei(std::span<const std::byte> extended, MrcHeader& header) {
   if (const auto voltage = kVoltages_V.find(first.voltage_V().value_or(0.0)))
     header.extended_voltage_kV = *voltage / kVolts_in_kV;
   if (const auto axis_deg = first.axis_deg()) take_axis(*axis_deg, header);
+  const auto of = [&](auto value) {
+    return [&records, value](std::int64_t section) {
+      return (records[static_cast<std::size_t>(section)].*value)();
+    };
+  };
+  constexpr double kSameAxis_deg = 1.0, kSameVoltage_V = 1.0;
+  note_difference("a tilt axis in degrees", of(&FeiRecord::axis_deg), kSameAxis_deg, header);
+  note_difference("a voltage in V", of(&FeiRecord::voltage_V), kSameVoltage_V, header);
+  note_difference(kPixelsInA, of(&FeiRecord::pixel_width_A),
+                  kSamePixel * std::fabs(first.pixel_width_A().value_or(0.0)), header);
 }
 
 }  // namespace

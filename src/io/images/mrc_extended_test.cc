@@ -97,6 +97,13 @@ TEST(Mrc, FloatRecordsOfExtendedHeaders) {
   EXPECT_EQ(agard.extended_tilt_deg, tilts);
   EXPECT_NEAR(agard.voxel_size_A[0], 3.5, 1e-6);
   EXPECT_EQ(agard.extended_axis_deg, 86.25);
+  // Records whose pixels differ.
+  std::string mixed = float_records(0, 32, -86.25f, 3.5e-10f);
+  put(mixed, 2 * 128 + 44, 7e-10f);
+  const MrcHeader two_sizes = header_with_extended(mixed, no_type, 0, 32, "Fei Company");
+  EXPECT_EQ(two_sizes.extended_difference,
+            "pixels in Å of 7 in section 3, and of 3.5 in the first");
+  EXPECT_EQ(xplore.extended_difference, "");
   const MrcHeader few = header_with_extended(float_records(0, 4, 0, 0), no_type, 0, 4);
   EXPECT_EQ(few.extended_tilt_deg, tilts);
   EXPECT_EQ(few.voxel_size_A[0], 1.0);
@@ -147,6 +154,17 @@ TEST(Mrc, RecordsOfFei1) {
     EXPECT_NEAR(header.voxel_size_A[0], 3.5, 1e-6);
     EXPECT_EQ(header.extended_axis_deg, 86.25);
   }
+  const auto difference = [&](std::size_t offset, double value) {
+    std::string extended = records(768, kTilt | kAxis | kPixel | (1u << 5), "5.1");
+    put(extended, 768 + offset, value);
+    return header_with_extended(extended, "FEI1", 0, 0).extended_difference;
+  };
+  EXPECT_EQ(difference(156, 3.51e-10), "");
+  EXPECT_EQ(difference(156, 7e-10), "pixels in Å of 7 in section 2, and of 3.5 in the first");
+  EXPECT_EQ(difference(84, 3e5),
+            "a voltage in V of 300000 in section 2, and of 200000 in the first");
+  EXPECT_EQ(difference(140, 3.0),
+            "a tilt axis in degrees of -3 in section 2, and of 86.25 in the first");
   constexpr std::uint32_t kVoltage = 1u << 5, kPixelHeight = 1u << 15;
   const MrcHeader more = header_with_extended(
       records(768, kTilt | kPixel | kVoltage | kPixelHeight, "5.1"), "FEI1", 0, 0);

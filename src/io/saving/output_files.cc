@@ -7,8 +7,11 @@
 #include <system_error>
 #include <utility>
 
+#include "io/images/view_images.h"
 #include "io/saving/file_identity.h"
 #include "io/saving/output_target.h"
+#include "io/tables/mdoc_images.h"
+#include "io/tables/view_table.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -19,6 +22,27 @@ namespace {
 std::vector<fs::path>& other_inputs() {
   static std::vector<fs::path> files;
   return files;
+}
+
+// Adds the images that a stack which is a table, an .mdoc or a folder with --mdoc names. Where they
+// cannot be found, none are added: the error says so when they are opened.
+void add_listed_images(const fs::path& stack, const std::optional<fs::path>& mdoc,
+                       std::vector<fs::path>& files) {
+  const auto add = [&](const auto& find) {
+    try {
+      for (const ImageInFile& image : find()) files.push_back(image.file);
+    } catch (const Error&) {
+    }
+  };
+  std::error_code failed;
+  if (is_view_table(stack)) {
+    for (const Frames frames : {Frames::kAll, Frames::kEven, Frames::kOdd})
+      add([&] { return find_view_images(read_view_table(stack), frames); });
+  } else if (stack.extension() == ".mdoc") {
+    add([&] { return find_mdoc_images(stack, stack.parent_path()); });
+  } else if (mdoc && fs::is_directory(stack, failed)) {
+    add([&] { return find_mdoc_images(*mdoc, stack); });
+  }
 }
 
 // Adds an input with the folders that it lies in: a store that is replaced takes all of itself
@@ -90,6 +114,8 @@ void require_volume_name(const std::filesystem::path& volume) {
 
 std::vector<fs::path> input_files(const SeriesFiles& input) {
   std::vector<fs::path> files{input.stack};
+  for (const auto& stack : {std::optional(input.stack), input.even, input.odd})
+    if (stack) add_listed_images(*stack, input.mdoc, files);
   for (const auto& file :
        {input.tlt, input.xf, input.xtilt, input.local, input.aln, input.mdoc, input.fiducials,
         input.mask, input.even, input.odd, input.ctf, input.mtf}) {

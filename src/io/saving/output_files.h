@@ -34,7 +34,7 @@ void check_output_files(const std::vector<std::filesystem::path>& results,
 /// Throws Error if the name of an MRC volume ends in the extension of another format.
 void require_volume_name(const std::filesystem::path& volume);
 
-/// Returns every file that a series is read from.
+/// Returns every file that a series is read from, with the images that a table or an .mdoc names.
 std::vector<std::filesystem::path> input_files(const SeriesFiles& files);
 
 }  // namespace tomofield::io

@@ -76,6 +76,19 @@ bool is_still_there(const fs::path& file, int descriptor) {
          by_name.st_ino == opened.st_ino && by_name.st_dev == opened.st_dev;
 }
 
+fs::path lock_file_of(const fs::path& target) {
+  return folder_of(target) / fmt::format(".{}.tomofield-lock", target.filename().string());
+}
+
+// Returns the one path of a target, by which this process knows its locks.
+fs::path key_of(const fs::path& target) {
+  std::error_code error;
+  const fs::path folder = fs::weakly_canonical(folder_of(target), error);
+  if (!error) return folder / target.filename();
+  throw Error(fmt::format("cannot write '{}': its directory '{}' cannot be found: {}",
+                          target.string(), folder_of(target).string(), error.message()));
+}
+
 [[noreturn]] void throw_lost(const fs::path& target, const fs::path& lock) {
   throw Error(fmt::format(
       "cannot write '{}': its lock '{}' cannot be found again after it is made; look at "
@@ -141,13 +154,11 @@ void take(const fs::path& target, Held& held) {
 
 OutputLock::OutputLock(const fs::path& path) {
   const fs::path target = output_target(path);
-  std::error_code error;
-  const fs::path folder = fs::weakly_canonical(folder_of(target), error);
-  fs::path key = (error ? folder_of(target) : folder) / target.filename();
+  fs::path key = key_of(target);
   const std::lock_guard guard(g_mutex);
   Held& held = g_held[key];
   if (held.uses == 0) {
-    held.file = folder_of(key) / fmt::format(".{}.tomofield-lock", target.filename().string());
+    held.file = lock_file_of(key);
     try {
       take(target, held);
     } catch (...) {
@@ -172,6 +183,11 @@ OutputLock::~OutputLock() {
 }
 
 OutputLock::OutputLock(OutputLock&& other) noexcept : key_(std::exchange(other.key_, {})) {}
+
+bool has_lock_file(const fs::path& path) {
+  std::error_code failed;
+  return fs::exists(lock_file_of(output_target(path)), failed);
+}
 
 std::vector<OutputLock> claim_outputs(const std::vector<fs::path>& paths,
                                       const std::function<void()>& check) {

@@ -31,6 +31,9 @@ class OutputLock {
   std::filesystem::path key_;  // empty once moved from
 };
 
+/// Says whether there is a lock file of `path`: a process writes it, or was killed while it did.
+bool has_lock_file(const std::filesystem::path& path);
+
 /// Locks the results of a run after `check`, which throws Error if they must not be written. Calls
 /// `check` once more behind the locks, because another run may have made the files meanwhile.
 std::vector<OutputLock> claim_outputs(const std::vector<std::filesystem::path>& paths,

@@ -176,6 +176,8 @@ TEST(CtfTable, ReadsGctf) {
   EXPECT_EQ(table.optics.voltage_kV, 200.0);
   EXPECT_EQ(table.optics.spherical_aberration_mm, 1.4);
   EXPECT_EQ(table.optics.amplitude_contrast, 0.08);
+  ASSERT_TRUE(table.optics.pixel_size_A.has_value());
+  EXPECT_NEAR(*table.optics.pixel_size_A, 2.8, 1e-9);  // 14 µm at 50,000 times
 }
 
 const std::string kWarp =

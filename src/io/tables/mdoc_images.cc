@@ -83,7 +83,7 @@ fs::path find_image(const std::string& movie, const std::vector<fs::path>& image
 
 }  // namespace
 
-std::shared_ptr<const ImageStack> open_mdoc_images(const fs::path& mdoc, const fs::path& folder) {
+std::vector<ImageInFile> find_mdoc_images(const fs::path& mdoc, const fs::path& folder) {
   const std::vector<fs::path> images = images_in(folder);
   std::vector<ImageInFile> views;
   for (const MdocSection& section : read_mdoc(mdoc).sections) {
@@ -97,7 +97,12 @@ std::shared_ptr<const ImageStack> open_mdoc_images(const fs::path& mdoc, const f
     }
     views.push_back({find_image(section.frame_name, images, where), std::nullopt});
   }
-  return image_stack_of_files(views, fmt::format("the images of {}", mdoc.string()));
+  return views;
+}
+
+std::shared_ptr<const ImageStack> open_mdoc_images(const fs::path& mdoc, const fs::path& folder) {
+  return image_stack_of_files(find_mdoc_images(mdoc, folder),
+                              fmt::format("the images of {}", mdoc.string()));
 }
 
 }  // namespace tomofield::io

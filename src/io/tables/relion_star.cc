@@ -56,10 +56,22 @@ std::optional<Defocus> defocus_of(const StarRow& row, const StarTable& table) {
   return is_whole ? std::optional(defocus) : std::nullopt;
 }
 
+// Returns the pixel size in Å of the images in which a defocus was measured. Gctf writes it as that
+// of the detector, in µm, and the magnification.
+template <typename Find>
+std::optional<double> pixel_size_by(const Find& find) {
+  constexpr double kAngstroms_in_um = 1e4;
+  if (const auto size_A = find("rlnMicrographPixelSize")) return size_A;
+  const auto detector_um = find("rlnDetectorPixelSize"), magnification = find("rlnMagnification");
+  if (!detector_um || !magnification || !(*magnification > 0.0)) return std::nullopt;
+  return kAngstroms_in_um * *detector_um / *magnification;
+}
+
 // Returns what find(column) finds in the columns of the microscope.
 template <typename Find>
 StatedOptics optics_by(const Find& find) {
-  return {find("rlnVoltage"), find("rlnSphericalAberration"), find("rlnAmplitudeContrast")};
+  return {find("rlnVoltage"), find("rlnSphericalAberration"), find("rlnAmplitudeContrast"),
+          pixel_size_by(find)};
 }
 
 // Returns the number in all rows of whichever table has the column. Throws Error if they differ.

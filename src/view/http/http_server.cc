@@ -121,10 +121,12 @@ void HttpServer::Impl::take_request(Connection& connection) {
     keeps_open = request.keeps_open && !request.has_body;
     return handler(request);
   });
+  // A refusal ends the connection: who is refused many times at once and takes no answer would
+  // otherwise hold it as one that is at work.
   if (Response* at_once = std::get_if<Response>(&answer))
-    connection.answer(std::move(*at_once), keeps_open);
+    connection.answer(std::move(*at_once), keeps_open && at_once->status == 200);
   else if (waiting.size() >= kMostWaiting)
-    connection.answer(refusal(503, "too many requests wait: ask again later"), keeps_open);
+    connection.answer(refusal(503, "too many requests wait: ask again later"), false);
   else
     waiting.push_back({&connection, keeps_open, std::get<Work>(std::move(answer))});
 }

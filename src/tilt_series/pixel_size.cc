@@ -1,0 +1,136 @@
+#include "tilt_series/pixel_size.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/log.h"
+#include "base/plausible.h"
+#include "tomofield/error.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+// Returns the pixel size that an .mdoc states for the images of a stack, or 0. Its PixelSpacing is
+// that of images of ImageSize, which may be binned records of these.
+double pixel_size_of_mdoc(const io::Mdoc& mdoc, const std::filesystem::path& path,
+                          const io::ImageStack& stack) {
+  const double spacing_A = mdoc.pixel_spacing_A.value_or(0.0);
+  if (!base::is_plausible_pixel_size(spacing_A)) return 0.0;
+  if (!mdoc.image_size_px) return spacing_A;
+  const auto [width, height] = *mdoc.image_size_px;
+  const auto ratio = [](std::int64_t a, std::int64_t b) {
+    return static_cast<double>(a) / static_cast<double>(b);
+  };
+  const double across = ratio(stack.header().nx, width), along = ratio(stack.header().ny, height);
+  // Cameras leave out a few rows or columns where they bin.
+  constexpr double kSame = 0.02;
+  const double whole = across >= 1.0 ? std::round(across) : 1.0 / std::round(1.0 / across);
+  if (std::fabs(across / whole - 1.0) < kSame && std::fabs(along / whole - 1.0) < kSame)
+    return spacing_A / whole;
+  base::log_warning(
+      fmt::format("'{}' states pixels of {} Å for images of {} × {}, and those of '{}' have {} × "
+                  "{}: {} Å is taken (give the right size with --pixel-size)",
+                  path.string(), spacing_A, width, height, stack.name(), stack.header().nx,
+                  stack.header().ny, spacing_A));
+  return spacing_A;
+}
+
+// Returns what is wrong with the pixel size of a header that has no usable one.
+std::string fault_of_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& stack) {
+  const auto facts = facts_of(options, stack);
+  if (!facts || (facts->voxel_size_A[0] == 0.0 && facts->voxel_size_A[1] == 0.0))
+    return "has no pixel size";
+  return fmt::format("states pixels of {:.6g} × {:.6g} Å, which cannot be", facts->voxel_size_A[0],
+                     facts->voxel_size_A[1]);
+}
+
+// Tells whether the pixels of a stack are square, or none of their sides is known.
+bool has_square_pixels(const io::ImageStack& stack) {
+  const auto& [width_A, height_A, depth_A] = stack.header().voxel_size_A;
+  return !(std::fabs(width_A - height_A) > 0.001 * std::fabs(std::max(width_A, height_A)));
+}
+
+void require_square_pixels(const io::ImageStack& stack) {
+  if (has_square_pixels(stack)) return;
+  const auto& [width_A, height_A, depth_A] = stack.header().voxel_size_A;
+  throw Error(
+      fmt::format("'{}' has pixels of {:.6g} × {:.6g} Å{}, and only square ones can be "
+                  "reconstructed: give their size "
+                  "with --pixel-size if the header is wrong",
+                  stack.name(), width_A, height_A,
+                  std::min(width_A, height_A) == 0.0 ? " (0: none, or one that cannot be)" : ""));
+}
+
+// Warns if a source states another pixel size than the header of a stack. Stacks are often binned
+// by a whole number, and the sizes of headers are often calibrated.
+void warn_of_other_size(const std::string& source, std::optional<double> stated_A,
+                        const io::ImageStack& stack) {
+  constexpr double kCalibration = 0.1;
+  const double in_header_A = stack.header().voxel_size_A[0];
+  if (stated_A.value_or(0.0) == 0.0) return;  // not known
+  const double ratio = in_header_A / *stated_A;
+  if (std::fabs(ratio / std::max(1.0, std::round(ratio)) - 1.0) < kCalibration) return;
+  base::log_warning(
+      fmt::format("{} states pixels of {:.6g} Å, and '{}' of {:.6g} Å: the latter is taken (give "
+                  "the right size with --pixel-size)",
+                  source, *stated_A, stack.name(), in_header_A));
+}
+
+}  // namespace
+
+std::optional<io::MrcFacts> facts_of(const TiltSeriesOptions& options,
+                                     const io::ImageStack& stack) {
+  if (stack.is_in_memory()) return std::nullopt;
+  return io::find_mrc_facts(options.stack, stack.header());
+}
+
+double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& stack,
+                       const std::optional<io::Mdoc>& mdoc) {
+  if (options.pixel_size_A) {
+    if (base::is_plausible_pixel_size(*options.pixel_size_A)) return *options.pixel_size_A;
+    throw Error(fmt::format("the pixel size {} Å (--pixel-size) is not from {} to {} Å",
+                            *options.pixel_size_A, base::kPixelSizes_A.low(),
+                            base::kPixelSizes_A.high()));
+  }
+  require_square_pixels(stack);
+  const double in_header_A = stack.header().voxel_size_A[0];
+  const bool is_default = in_header_A == 0.0 || in_header_A == 1.0;
+  if (is_default && mdoc) {
+    const double stated_A = pixel_size_of_mdoc(*mdoc, *options.mdoc, stack);
+    if (stated_A > 0.0) return stated_A;
+  }
+  if (in_header_A > 0.0 && !is_default) {
+    if (mdoc)
+      warn_of_other_size(fmt::format("'{}'", options.mdoc->string()), mdoc->pixel_spacing_A, stack);
+    return in_header_A;
+  }
+  if (stack.is_in_memory()) {
+    if (in_header_A > 0.0) return in_header_A;
+    throw Error("views in memory have no pixel size: give it in Å with --pixel-size");
+  }
+  base::log_warning(fmt::format(
+      "'{}' {}; 1 Å is assumed (give it with --pixel-size)", stack.name(),
+      in_header_A == 0.0 ? fault_of_pixel_size(options, stack)
+                         : "states pixels of 1 Å, as programs write that do not know their size"));
+  return 1.0;
+}
+
+void warn_of_headers(const TiltSeriesOptions& options, const io::ImageStack& stack) {
+  const io::MrcHeader& header = stack.header();
+  if (!header.extended_difference.empty())
+    base::log_warning(
+        fmt::format("the extended header of '{}' states {}: that of the first section is taken",
+                    stack.name(), header.extended_difference));
+  if (!options.pixel_size_A)
+    return warn_of_other_size(fmt::format("the extended header of '{}'", stack.name()),
+                              header.extended_pixel_A, stack);
+  if (has_square_pixels(stack)) return;
+  base::log_warning(fmt::format(
+      "'{}' has pixels of {:.6g} × {:.6g} Å, and square ones of {:.6g} Å are taken (--pixel-size)",
+      stack.name(), header.voxel_size_A[0], header.voxel_size_A[1], *options.pixel_size_A));
+}
+
+}  // namespace tomofield::tilt_series
