@@ -8,6 +8,7 @@
 #include "base/system/memory.h"
 #include "exchange/model_export.h"
 #include "io/images/mrc.h"
+#include "io/images/mrc_format.h"
 #include "io/saving/output_files.h"
 #include "io/saving/output_lock.h"
 #include "output/public_model.h"
@@ -79,7 +80,7 @@ Tomogram read_mrc(const std::filesystem::path& path) {
   base::require_memory(count * sizeof(float), fmt::format("'{}' in memory", path.string()).c_str(),
                        "export a part of it, or with larger voxels");
   Tomogram volume{.size = {header.nx, header.ny, header.nz},
-                  .voxel_size_A = header.voxel_size_A[0],
+                  .voxel_size_A = io::cubic_voxel_size_A(header, path),
                   .values = std::vector<float>(count)};
   for (std::int64_t z = 0; z < header.nz; ++z)
     file.read_section(

@@ -4,6 +4,7 @@
 
 #include "evaluate/volume_pair.h"
 #include "io/images/mrc.h"
+#include "io/images/mrc_format.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {
@@ -20,7 +21,7 @@ std::string to_text(const Grid& grid) {
 Grid read_grid(const std::filesystem::path& mrc) {
   const io::MrcReader file(mrc);
   const io::MrcHeader& header = file.header();
-  return {{header.nx, header.ny, header.nz}, header.voxel_size_A[0]};
+  return {{header.nx, header.ny, header.nz}, io::cubic_voxel_size_A(header, mrc)};
 }
 
 void require_one_grid(const NamedGrid& main, const NamedGrid& other) {

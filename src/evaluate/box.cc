@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "io/images/mrc_format.h"
 #include "tomofield/error.h"
 
 namespace tomofield::evaluate {
@@ -33,7 +34,7 @@ base::Volume read_box(const io::MrcReader& file, const base::Box& box) {
   if (file.header().sections_a_volume > 0)
     throw Error(fmt::format("'{}' is a stack of volumes (space group 401): give a file of one",
                             file.path().string()));
-  base::Volume volume(box.shape(), file.header().voxel_size_A[0]);
+  base::Volume volume(box.shape(), io::cubic_voxel_size_A(file.header(), file.path()));
   const base::Shape3& shape = volume.shape;
   std::vector<float> rows(static_cast<std::size_t>(file.header().nx * shape.ny));
   for (std::int64_t z = 0; z < shape.nz; ++z) {

@@ -8,6 +8,7 @@
 
 #include "base/log.h"
 #include "io/images/mrc.h"
+#include "io/images/mrc_format.h"
 #include "tomofield/error.h"
 
 namespace tomofield::evaluate {
@@ -18,7 +19,8 @@ std::string to_text(const VolumeSizes& sizes) {
 }
 
 void check_voxel_sizes(const io::MrcReader& first, const io::MrcReader& second) {
-  const double a = first.header().voxel_size_A[0], b = second.header().voxel_size_A[0];
+  const double a = io::cubic_voxel_size_A(first.header(), first.path()),
+               b = io::cubic_voxel_size_A(second.header(), second.path());
   if (std::abs(a - b) <= 1e-4 * std::abs(b)) return;
   if (voxel_sizes_differ(a, b, kMaxScaleDifference))
     throw Error(fmt::format(

@@ -9,6 +9,7 @@
 #include "base/log.h"
 #include "exchange/relion_alignment.h"
 #include "io/images/mrc.h"
+#include "io/images/mrc_format.h"
 #include "io/images/view_images.h"
 #include "io/is_file.h"
 #include "io/saving/atomic_file.h"
@@ -116,7 +117,7 @@ void write_relion_output(const options::ReconstructOptions& options, const fs::p
   const io::RelionTomograms all = io::read_relion_tomograms(origin->file);
   const std::size_t row = find_row(all, *origin);
   const io::MrcHeader header = io::MrcReader(volume).header();
-  const double voxel_A = header.voxel_size_A[0];
+  const double voxel_A = io::cubic_voxel_size_A(header, volume);
   const double binning = voxel_A / all.tomograms[row].pixel_size_A.value_or(voxel_A);
   io::StarTable table = all.table.only({row});
   table.set(0, "rlnTomoTomogramBinning", fmt::format("{:.6f}", binning));

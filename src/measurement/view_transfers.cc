@@ -429,6 +429,12 @@ std::vector<microscope::ViewTransfer> view_transfers(const tilt_series::TiltSeri
         "give --ctf-phase-flipped",
         series.stack().name()));
   const auto exposures = find_exposures(files, options, sections);
+  // IMOD's mtffilter writes "MTFFILTER: Dose weight filtered".
+  if (exposures && io::is_in_labels(series.stack().header(), "dose weight"))
+    base::log_warning(fmt::format(
+        "'{}' is weighted by the dose already, as its header says, and its views count as not "
+        "weighted: give --dose-weighted",
+        series.stack().name()));
   const auto detector = find_detector(files, series);
   if (!ctf && !exposures && !detector) return {};
   const microscope::Optics optics = find_optics(files, options, ctf, series);

@@ -94,6 +94,17 @@ void set_pixel_size(Project& project, const fs::path& edf, const Entries& entrie
                           io::open_image_stack(stack)->header().voxel_size_A[0]);
 }
 
+// Warns of tilts that a dataset states itself, and of which eTomo has made no file.
+void warn_of_stated_tilts(Project& project, const fs::path& edf, const Entries& entries) {
+  constexpr const char* kEntry = "Setup.AxisA.TiltAngle.Type";
+  const std::string type = value_of(entries, kEntry);
+  if ((type != "Range" && type != "List") || project.ignores(kEntry)) return;
+  project.warn(fmt::format(
+      "'{}' states the tilts of its views ({} is {}), which are not read: write them into a file "
+      "and give it with --tlt (--ignore {} says that others are meant)",
+      edf.string(), kEntry, type, kEntry));
+}
+
 // Sets the files that eTomo names after a dataset, whose alignment may not be there yet.
 void set_dataset(Project& project, const fs::path& edf, const Entries& entries,
                  const std::string& name) {
@@ -111,6 +122,8 @@ void set_dataset(Project& project, const fs::path& edf, const Entries& entries,
   project.set("stack", stack->string(), edf, kEntry);
   if (const auto tlt = first_file(stem, std::array{".tlt", ".rawtlt"}))
     project.set("--tlt", tlt->string(), edf, kEntry);
+  else
+    warn_of_stated_tilts(project, edf, entries);
   if (const fs::path xf = stem.string() + ".xf"; is_file(xf)) {
     project.set("--xf", xf.string(), edf, kEntry);
     compare_axis(project, edf, entries);

@@ -7,6 +7,7 @@
 #include "base/threads/parallel.h"
 #include "io/images/jpeg.h"
 #include "io/images/mrc.h"
+#include "io/images/mrc_format.h"
 #include "report/contrast.h"
 #include "report/page_picture.h"
 #include "report/reduced_volume.h"
@@ -101,7 +102,7 @@ EmbeddedVolume embed_volume(const std::filesystem::path& mrc) {
   EmbeddedVolume volume;
   volume.size = reduced_size(header, kMostVoxels);
   volume.file_size = {header.nx, header.ny, header.nz};
-  volume.voxel_size_A = header.voxel_size_A[0];
+  volume.voxel_size_A = io::cubic_voxel_size_A(header, mrc);
   choose_limits(contrast_of(file), volume);
   arrange_sheets(volume);
   const Bytes bytes = reduced_bytes(file, volume);

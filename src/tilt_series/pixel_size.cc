@@ -13,13 +13,12 @@
 namespace tomofield::tilt_series {
 namespace {
 
-// Returns the pixel size that an .mdoc states for the images of a stack, or 0. Its PixelSpacing is
-// that of images of ImageSize, which may be binned records of these.
-double pixel_size_of_mdoc(const io::Mdoc& mdoc, const std::filesystem::path& path,
-                          const io::ImageStack& stack) {
+// Returns the pixel size that an .mdoc states for the images of a stack. Its PixelSpacing is that
+// of images of ImageSize, which may be binned records of these. Returns nothing if it states none,
+// or if the one size is no whole multiple of the other.
+std::optional<double> size_by_image_size(const io::Mdoc& mdoc, const io::ImageStack& stack) {
   const double spacing_A = mdoc.pixel_spacing_A.value_or(0.0);
-  if (!base::is_plausible_pixel_size(spacing_A)) return 0.0;
-  if (!mdoc.image_size_px) return spacing_A;
+  if (!base::is_plausible_pixel_size(spacing_A) || !mdoc.image_size_px) return std::nullopt;
   const auto [width, height] = *mdoc.image_size_px;
   const auto ratio = [](std::int64_t a, std::int64_t b) {
     return static_cast<double>(a) / static_cast<double>(b);
@@ -28,8 +27,19 @@ double pixel_size_of_mdoc(const io::Mdoc& mdoc, const std::filesystem::path& pat
   // Cameras leave out a few rows or columns where they bin.
   constexpr double kSame = 0.02;
   const double whole = across >= 1.0 ? std::round(across) : 1.0 / std::round(1.0 / across);
-  if (std::fabs(across / whole - 1.0) < kSame && std::fabs(along / whole - 1.0) < kSame)
-    return spacing_A / whole;
+  const bool is_whole =
+      std::fabs(across / whole - 1.0) < kSame && std::fabs(along / whole - 1.0) < kSame;
+  return is_whole ? std::optional(spacing_A / whole) : std::nullopt;
+}
+
+// Returns the pixel size that an .mdoc states for the images of a stack, or 0.
+double pixel_size_of_mdoc(const io::Mdoc& mdoc, const std::filesystem::path& path,
+                          const io::ImageStack& stack) {
+  const double spacing_A = mdoc.pixel_spacing_A.value_or(0.0);
+  if (!base::is_plausible_pixel_size(spacing_A)) return 0.0;
+  if (const auto size_A = size_by_image_size(mdoc, stack)) return *size_A;
+  if (!mdoc.image_size_px) return spacing_A;
+  const auto [width, height] = *mdoc.image_size_px;
   base::log_warning(
       fmt::format("'{}' states pixels of {} Å for images of {} × {}, and those of '{}' have {} × "
                   "{}: {} Å is taken (give the right size with --pixel-size)",
@@ -64,19 +74,28 @@ void require_square_pixels(const io::ImageStack& stack) {
                   std::min(width_A, height_A) == 0.0 ? " (0: none, or one that cannot be)" : ""));
 }
 
-// Warns if a source states another pixel size than the header of a stack. Stacks are often binned
-// by a whole number, and the sizes of headers are often calibrated.
-void warn_of_other_size(const std::string& source, std::optional<double> stated_A,
+// Warns if a source states another pixel size than the header of a stack. Sizes of headers are
+// often calibrated. Stacks are often binned by a whole number, of which a source may not know.
+void warn_of_other_size(const std::string& source, double stated_A, bool knows_binning,
                         const io::ImageStack& stack) {
   constexpr double kCalibration = 0.1;
   const double in_header_A = stack.header().voxel_size_A[0];
-  if (stated_A.value_or(0.0) == 0.0) return;  // not known
-  const double ratio = in_header_A / *stated_A;
-  if (std::fabs(ratio / std::max(1.0, std::round(ratio)) - 1.0) < kCalibration) return;
+  if (stated_A == 0.0) return;  // not known
+  const double ratio = in_header_A / stated_A;
+  const double expected = knows_binning ? 1.0 : std::max(1.0, std::round(ratio));
+  if (std::fabs(ratio / expected - 1.0) < kCalibration) return;
   base::log_warning(
       fmt::format("{} states pixels of {:.6g} Å, and '{}' of {:.6g} Å: the latter is taken (give "
                   "the right size with --pixel-size)",
-                  source, *stated_A, stack.name(), in_header_A));
+                  source, stated_A, stack.name(), in_header_A));
+}
+
+void warn_of_other_size(const io::Mdoc& mdoc, const std::filesystem::path& path,
+                        const io::ImageStack& stack) {
+  const auto size_A = size_by_image_size(mdoc, stack);
+  warn_of_other_size(fmt::format("'{}'", path.string()),
+                     size_A.value_or(mdoc.pixel_spacing_A.value_or(0.0)), size_A.has_value(),
+                     stack);
 }
 
 }  // namespace
@@ -103,8 +122,7 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& s
     if (stated_A > 0.0) return stated_A;
   }
   if (in_header_A > 0.0 && !is_default) {
-    if (mdoc)
-      warn_of_other_size(fmt::format("'{}'", options.mdoc->string()), mdoc->pixel_spacing_A, stack);
+    if (mdoc) warn_of_other_size(*mdoc, *options.mdoc, stack);
     return in_header_A;
   }
   if (stack.is_in_memory()) {
@@ -126,7 +144,8 @@ void warn_of_headers(const TiltSeriesOptions& options, const io::ImageStack& sta
                     stack.name(), header.extended_difference));
   if (!options.pixel_size_A)
     return warn_of_other_size(fmt::format("the extended header of '{}'", stack.name()),
-                              header.extended_pixel_A, stack);
+                              header.extended_pixel_A.value_or(0.0), /*knows_binning=*/false,
+                              stack);
   if (has_square_pixels(stack)) return;
   base::log_warning(fmt::format(
       "'{}' has pixels of {:.6g} × {:.6g} Å, and square ones of {:.6g} Å are taken (--pixel-size)",

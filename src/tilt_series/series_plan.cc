@@ -93,6 +93,12 @@ InPlaneAlignment alignment_of_axis(double axis_deg, const io::ImageStack& stack)
 StatedAxis nominal_axis(const SectionTable& table) {
   const auto first = std::ranges::find_if(table.of_section,
                                           [](const auto& section) { return section.has_value(); });
+  constexpr double kSame_deg = 1.0;
+  for (const auto& section : table.of_section)
+    if (section && angle_between_axes(section->rotation_deg, (*first)->rotation_deg) > kSame_deg)
+      throw Error(fmt::format(
+          "'{}' states nominal tilt axes of {:.6g}° and {:.6g}°: a series has one, so correct it",
+          table.source, (*first)->rotation_deg, section->rotation_deg));
   return {first == table.of_section.end() ? 0.0 : (*first)->rotation_deg,
           fmt::format("'{}', whose views are not aligned yet", table.source)};
 }
@@ -144,6 +150,23 @@ void require_whole_images(const io::ImageStack& stack) {
       "the extended header of '{}' places several sections at one Z: a montage of pieces is not "
       "read: blend them into one image a view (in eTomo or with blendmont)",
       stack.name()));
+}
+
+/// Warns if the header states values that its mode cannot hold: programs have written unsigned
+/// 16-bit numbers as signed ones, and the other way round.
+void warn_of_mode(const io::ImageStack& stack) {
+  const io::MrcHeader& header = stack.header();
+  constexpr double kLargestSigned = 32767.0;
+  const bool is_unsigned =
+      header.mode == io::MrcMode::kInt16 && header.max > kLargestSigned && header.max >= header.min;
+  const bool is_signed =
+      header.mode == io::MrcMode::kUint16 && header.min < 0.0 && header.max >= header.min;
+  if (!is_unsigned && !is_signed) return;
+  base::log_warning(fmt::format(
+      "'{}' has 16-bit numbers with{} sign (mode {}), and its header states values from {:g} to "
+      "{:g}: those that do not fit are misread, so convert it (IMOD's newstack -mode 2)",
+      stack.name(), is_unsigned ? "" : "out a", static_cast<int>(header.mode), header.min,
+      header.max));
 }
 
 void warn_of_sections_beyond(const TiltSeriesOptions& options, const io::ImageStack& stack) {
@@ -319,6 +342,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
     if (options.starts_raw && !axis && !alignment) warn_of_unknown_axis(stack);
     warn_of_sections_beyond(options, stack);
     warn_of_headers(options, stack);
+    warn_of_mode(stack);
   }
 
   plan.angle_source = angles.source;

@@ -8,6 +8,7 @@
 #include "base/system/memory.h"
 #include "base/threads/parallel.h"
 #include "io/images/mrc.h"
+#include "io/images/mrc_format.h"
 #include "report/reduced_volume.h"
 #include "tomofield/error.h"
 #include "view/viewed_volume.h"
@@ -24,7 +25,7 @@ class ViewedMrc : public ViewedVolume {
     const io::MrcHeader& header = file.header();
     title_ = path.filename().string();
     size_ = {header.nx, header.ny, header.nz};
-    voxel_size_A_ = header.voxel_size_A[0];
+    voxel_size_A_ = io::cubic_voxel_size_A(header, path);
     contrast_ = report::contrast_of(file);
     held_ = report::reduced_size(header, most_voxels());
     if (held_ != size_) {

@@ -144,6 +144,16 @@ def test_box_is_in_voxels_of_the_truth():
         assert result.returncode == 2 and "box" in result.stderr, (box, result)
 
 
+def test_voxels_that_are_no_cubes_are_refused():
+    _, truth = random_pair((10, 20, 30), 9)
+    cubes, flat = save("cubes.mrc", truth), save("flat.mrc", truth)
+    with mrcfile.open(flat, "r+") as file:
+        file.voxel_size = (10, 10, 40)
+    for words in ((cubes, flat), (flat, cubes), (cubes, "--fsc", flat)):
+        result = run(*words)
+        assert result.returncode == 2 and "10 × 10 × 40 Å" in result.stderr, result
+
+
 def test_equal_volumes_are_infinitely_alike():
     _, truth = random_pair((10, 20, 30), 7)
     file = save("a.mrc", truth)

@@ -283,6 +283,10 @@ def test_a_series_of_relion_that_is_not_aligned_yet():
     expect(dry(folder, "TS_01.star", status=2), "not aligned yet", "85.3°", "--align full")
     expect(dry(folder, "TS_01.star", "--align", "full"), "tilt axis of the views: 85.3° from",
            "tilts -42.0° to 42.0°")
+    with open(os.path.join(folder, "TS_01.star"), encoding="utf-8") as file:
+        text = file.read()
+    write(folder, "TS_01.star", text.replace(" 85.3\n", " 0\n", 1))
+    expect(dry(folder, "TS_01.star", "--align", "full", status=2), "nominal tilt axes of 0° and 85.3°")
 
 
 # ---------------------------------------------------------------------------------------- eTomo
@@ -358,6 +362,12 @@ def test_a_dataset_of_etomo():
     write(folder, "TS_01.edf", edf_text + "Setup.AxisA.ExcludeProjections=3,5-6\nSetup.PixelSize=0.5\n")
     expect(harness.succeed("info", ".", cwd=folder).stdout, "--xf ./TS_01.xf")
     expect(dry(folder, "TS_01.edf"), "--exclude 3,5-6", "states pixels of 5 Å")
+    ranged = "Setup.AxisA.TiltAngle.Type=Range\nSetup.AxisA.TiltAngle.RangeMin=-30\n"
+    write(folder, "TS_01.edf", edf_text + ranged)
+    assert "TiltAngle.Type" not in dry(folder, "TS_01.edf"), "a .rawtlt is there"
+    os.rename(os.path.join(folder, "TS_01.rawtlt"), os.path.join(folder, "kept"))
+    expect(dry(folder, "TS_01.edf", status=2), "Setup.AxisA.TiltAngle.Type is Range", "--tlt")
+    os.rename(os.path.join(folder, "kept"), os.path.join(folder, "TS_01.rawtlt"))
     write(folder, "TS_01.edf", edf_text + "Setup.ImageRotationA=5.3\n")
     expect(dry(folder, "TS_01.edf"), "TS_01.xf' turns the views", "85.3°", "Setup.ImageRotationA", "5.3°")
     write(folder, "TS_01.edf", "Setup.DatasetName=TS_01\nSetup.AxisType=Dual Axis\n")
@@ -390,6 +400,8 @@ def test_the_pixel_size_of_a_binned_record():
     harness.write_stack(os.path.join(folder, "TS_01.mrc"), bead_views(0, (56, 72)), 1.0)
     write(folder, "TS_01.mdoc", mdoc_text(head="PixelSpacing = 5.4\nImageSize = 18 14"))
     expect(dry(folder, "TS_01.mdoc"), "pixels of 1.35 Å")
+    harness.write_stack(os.path.join(folder, "TS_01.mrc"), bead_views(0, (56, 72)), 5.4)
+    expect(dry(folder, "TS_01.mdoc"), "states pixels of 1.35 Å", "of 5.4 Å: the latter is taken")
 
 
 @pytest.mark.parametrize("spacing_A, is_other", [(7, True), (20, True), (5, False), (9.7, False)])
@@ -678,6 +690,32 @@ def test_a_stack_that_was_phase_flipped_is_named():
              "--overwrite", "-o", "out.mrc"]
     expect(harness.succeed(*words, cwd=folder).stderr, "ctfphaseflip", "--ctf-phase-flipped")
     assert "ctfphaseflip" not in harness.succeed(*words, "--ctf-phase-flipped", cwd=folder).stderr
+
+
+def test_a_stack_that_was_weighted_by_the_dose_is_named():
+    folder = write_series("weighted")
+    with mrcfile.open(os.path.join(folder, "TS_01.mrc"), "r+") as file:
+        file.header.label[0], file.header.nlabl = "MTFFILTER: Dose weight filtered", 1
+    words = ["reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--dose-per-tilt", 3, "--thickness", 24,
+             "--epochs", 1, "--coarse-epochs", 0, "--tv", 5, "--tv-penalty", "smooth", "--prior", "tv",
+             "--overwrite", "-o", "out.mrc"]
+    expect(harness.succeed(*words, cwd=folder).stderr, "weighted by the dose already", "--dose-weighted")
+
+
+@pytest.mark.parametrize("kind, low, high, said", [
+    ("<i2", 0, 60000, "with sign (mode 1)"), ("<u2", -3000, 9000, "without a sign (mode 6)"),
+    ("<i2", -3000, 9000, None), ("<u2", 0, 60000, None)])
+def test_values_that_the_mode_cannot_hold_are_named(kind, low, high, said):
+    folder = write_series("mode")
+    path = os.path.join(folder, "TS_01.mrc")
+    views = bead_views(0, (56, 72))
+    with mrcfile.new(path, overwrite=True) as file:
+        file.set_data((100 + 10 * views).astype(kind))
+        file.voxel_size = 10
+    with mrcfile.open(path, "r+") as file:
+        file.header.dmin, file.header.dmax = low, high
+    text = dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt")
+    assert (said in text) if said else "16-bit numbers" not in text, text
 
 
 def test_the_description_of_a_tiff_stack_states_its_axis(tmp_path):

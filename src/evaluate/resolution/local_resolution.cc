@@ -17,6 +17,7 @@
 #include "evaluate/box.h"
 #include "evaluate/uncertainty.h"
 #include "io/images/mrc.h"
+#include "io/images/mrc_format.h"
 
 namespace tomofield::evaluate {
 namespace {
@@ -242,7 +243,7 @@ void write_local_resolution(const LocalResolution& resolution, const std::filesy
                             const std::filesystem::path& path) {
   const io::MrcReader file(like);
   const std::int64_t nx = file.header().nx, ny = file.header().ny;
-  const auto voxel_A = static_cast<float>(file.header().voxel_size_A[0]);
+  const auto voxel_A = static_cast<float>(io::cubic_voxel_size_A(file.header(), like));
   io::MrcWriter map(path, map_like(file.header(), "local resolution in A"));
   base::parallel_for("write resolution", file.header().nz, [&](std::int64_t z) {
     std::vector<float> section;

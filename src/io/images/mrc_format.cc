@@ -407,6 +407,20 @@ std::optional<MrcFacts> find_mrc_facts(const std::filesystem::path& path, const 
                   beyond / (header.nx * header.ny * width)};
 }
 
+double cubic_voxel_size_A(const MrcHeader& header, const std::filesystem::path& path) {
+  constexpr double kSame = 0.01;  // of calibrations
+  const auto& [x_A, y_A, z_A] = header.voxel_size_A;
+  const auto differs = [x = x_A](double side_A) {
+    return std::fabs(side_A - x) > kSame * std::max(std::fabs(x), std::fabs(side_A));
+  };
+  const bool has_depth = header.is_volume || (z_A != 0.0 && z_A != 1.0);
+  if (!differs(y_A) && !(has_depth && differs(z_A))) return x_A;
+  throw Error(
+      fmt::format("'{}' has voxels of {:.6g} × {:.6g} × {:.6g} Å, and only cubes are read: correct "
+                  "its header (IMOD's alterheader -del), or resample it",
+                  path.string(), x_A, y_A, z_A));
+}
+
 bool is_in_labels(const MrcHeader& header, std::string_view word) {
   return std::ranges::any_of(header.labels, [&](std::string label) {
     std::ranges::transform(label, label.begin(),

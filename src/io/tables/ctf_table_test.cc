@@ -104,6 +104,11 @@ TEST(CtfTable, ReadsVersion2OfImod) {
   const double expected_A[] = {40000, 40000, 42000, 44000, 46000, 44000, 42000, 42000};
   for (std::size_t i = 0; i < 8; ++i)
     expect_defocus(table.views[i], expected_A[i], expected_A[i], 0.0, 0.0);
+  EXPECT_EQ(table.tilt_deg[1], -58.0);  // a line's angles are those of its first and last view
+  EXPECT_EQ(table.tilt_deg[0], std::nullopt);
+  EXPECT_EQ(table.tilt_deg[6], -47.0);
+  expect_parts(message_of<Error>([] { read("TS.defocus", "1 3 -60 500 4000 2\n"); }),
+               {"TS.defocus", "line 1", "500"});
 }
 
 TEST(CtfTable, ReadsVersion3OfImod) {
@@ -178,6 +183,13 @@ TEST(CtfTable, ReadsGctf) {
   EXPECT_EQ(table.optics.amplitude_contrast, 0.08);
   ASSERT_TRUE(table.optics.pixel_size_A.has_value());
   EXPECT_NEAR(*table.optics.pixel_size_A, 2.8, 1e-9);  // 14 µm at 50,000 times
+  const std::string views =
+      "\ndata_a\n\nloop_\n_rlnDefocusU #1\n_rlnDefocusV #2\n"
+      "_rlnDefocusAngle #3\n_rlnVoltage #4\n3e4 3e4 0 300\n";
+  expect_parts(message_of<Error>([&] {
+                 read("a.star", "\ndata_optics\n\nloop_\n_rlnVoltage #1\n200\n" + views);
+               }),
+               {"a.star", "_rlnVoltage", "row 1"});
 }
 
 const std::string kWarp =
@@ -237,6 +249,8 @@ TEST(CtfTable, UnitsAndLimitsOfTheMicroscopeAreRefused) {
   expect_parts(refusal("spherical aberration: 2700 um"), {"line 1", "'um'", "mm"});
   expect_parts(refusal("acceleration voltage: 300000 keV"), {"voltage", "300000"});
   expect_parts(refusal("spherical aberration: -2.7 mm"), {"aberration", "-2.7"});
+  expect_parts(refusal("acceleration voltage: 300 keV\n# acceleration voltage: 200 keV"),
+               {"line 2", "acceleration voltage", "200", "300"});
   expect_parts(refusal("amplitude contrast: 7"), {"amplitude contrast", "7"});
   expect_parts(refusal("Columns: #2 - defocus 1 [nm]"), {"line 1", "defocus 1", "[nm]"});
   expect_parts(refusal("#5 - additional phase shift [degrees]"), {"line 1", "[degrees]"});

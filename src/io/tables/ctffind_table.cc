@@ -57,7 +57,12 @@ void require_unit(const std::filesystem::path& path, const TextLine& line, std::
 
 void read_comment(const std::filesystem::path& path, const TextLine& line, StatedOptics& optics) {
   const auto take = [&](std::string_view key, std::string_view unit, std::optional<double>& value) {
-    if (const auto number = number_after(path, line, key, unit)) value = number;
+    const auto number = number_after(path, line, key, unit);
+    if (!number) return;
+    if (value && *value != *number)
+      throw Error(fmt::format("'{}', line {}: '{}' is {}, and {} in a line before: leave one out",
+                              path.string(), line.number, key, *number, *value));
+    value = number;
   };
   require_unit(path, line, "defocus 1", "A");
   require_unit(path, line, "phase shift", "rad");

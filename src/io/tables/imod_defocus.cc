@@ -79,6 +79,15 @@ struct Entry {
   std::int64_t first_view = 0, last_view = 0;  // from 0
   double tilt_deg = 0.0;                       // the mean of their angles
   Defocus defocus;
+  double range_deg = 0.0;  // between their angles
+
+  // Tells whether the mean angle is that of the middle view: of several views, it is that of a view
+  // or lies between two that are near each other.
+  bool has_tilt_of_middle() const {
+    constexpr double kNear_deg = 4.0;
+    const auto count = last_view - first_view + 1;
+    return count % 2 == 1 || std::fabs(range_deg) / static_cast<double>(count - 1) < kNear_deg;
+  }
 };
 
 Entry parse_entry(const std::filesystem::path& path, const TextLine& line, const Form& form,
@@ -115,7 +124,11 @@ Entry parse_entry(const std::filesystem::path& path, const TextLine& line, const
     defocus.phase_shift_deg = form.has(kPhaseInRadians) ? phase / kRadians : phase;
   }
   const double sign = form.has(kAnglesInverted) ? -1.0 : 1.0;
-  return {first - 1, last - 1, sign * (values[2] + values[3]) / 2, defocus};
+  for (const std::size_t i : {2, 3})
+    if (!base::is_plausible(values[i], base::kLargestAngle_deg))
+      throw Error(fmt::format("'{}', line {}: {} is no angle in degrees: correct it", path.string(),
+                              line.number, words[i]));
+  return {first - 1, last - 1, sign * (values[2] + values[3]) / 2, defocus, values[3] - values[2]};
 }
 
 // Returns a defocus for each view. As in IMOD, a line of the file is about the middle view of its
@@ -172,7 +185,7 @@ CtfTable read_imod_defocus(const std::filesystem::path& path) {
                                 (form.has(kHasPhase) ? 1 : 0) + (form.has(kHasCutOn) ? 1 : 0);
   std::map<std::int64_t, Defocus> at_middle;
   std::int64_t num_views = 0;
-  std::vector<std::optional<double>> tilts;  // of views with a line of their own
+  std::vector<std::optional<double>> tilts;  // of the views in the middle of a line's
   for (const TextLine& line : lines) {
     const Entry entry = parse_entry(path, line, form, num_words);
     const std::int64_t middle = (entry.first_view + entry.last_view) / 2;
@@ -181,8 +194,7 @@ CtfTable read_imod_defocus(const std::filesystem::path& path) {
                               path.string(), line.number, middle + 1));
     num_views = std::max(num_views, entry.last_view + 1);
     tilts.resize(static_cast<std::size_t>(num_views));
-    if (entry.first_view == entry.last_view)
-      tilts[static_cast<std::size_t>(entry.first_view)] = entry.tilt_deg;
+    if (entry.has_tilt_of_middle()) tilts[static_cast<std::size_t>(middle)] = entry.tilt_deg;
   }
   CtfTable table{path, interpolated(at_middle, num_views), {}, {}, std::move(tilts), true};
   if (form.has(kHasCutOn))

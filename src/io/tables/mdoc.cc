@@ -48,6 +48,7 @@ double require_number(const std::filesystem::path& path, const TextLine& line,
 struct StatedAxes {
   std::optional<AxisAngle> serialem, tomography, entry;
   std::optional<AxisAngle> rotation;  // the first RotationAngle: 90° more than the axis (SerialEM)
+  std::optional<AxisAngle> other_rotation;  // one that differs from it
   int two_directions_line = 0;  // of a title that states a bidirectional or dose-symmetric scheme
 };
 
@@ -74,15 +75,30 @@ void read_title(const std::filesystem::path& path, const TextLine& line, StatedA
   set(tomography_axis_of_title(line.text), axes.tomography);
 }
 
+// Tells whether sections state two tilt axes, and not one that was rounded.
+bool are_two_axes(const AxisAngle& a, double b_deg) {
+  constexpr double kSame_deg = 1.0;
+  return std::fabs(std::remainder(a.value - b_deg, 360.0)) > kSame_deg;
+}
+
+[[noreturn]] void throw_two_axes(const std::filesystem::path& path, std::string_view key,
+                                 const AxisAngle& first, const AxisAngle& other) {
+  throw Error(fmt::format(
+      "'{}', line {}: {} is {}°, and {}° in line {}: a series has one tilt axis, so correct it",
+      path.string(), other.line, key, other.value, first.value, first.line));
+}
+
 // Sets the axis of the first of the angles there are.
-void choose_axis(const StatedAxes& axes, Mdoc& mdoc) {
+void choose_axis(const std::filesystem::path& path, const StatedAxes& axes, Mdoc& mdoc) {
   if (axes.serialem) {
     mdoc.tilt_axis_deg = axes.serialem;
   } else if (axes.tomography) {
     set_axis_of_tomography(*axes.tomography, /*is_title=*/true, mdoc);
   } else if (axes.entry) {
     set_axis_of_tomography(*axes.entry, /*is_title=*/false, mdoc);
-  } else if (axes.rotation && axes.rotation->value != 0.0) {  // 0 stands for no angle
+  } else if (axes.rotation) {
+    if (axes.other_rotation)
+      throw_two_axes(path, "RotationAngle", *axes.rotation, *axes.other_rotation);
     mdoc.lone_rotation_deg = axes.rotation;
   }
 }
@@ -213,6 +229,18 @@ std::optional<double> find_number(const std::filesystem::path& path, const TextL
                           largest));
 }
 
+// Notes a RotationAngle. 0 stands for no angle.
+void read_rotation(const std::filesystem::path& path, const TextLine& line, const KeyValue& entry,
+                   StatedAxes& axes) {
+  const auto angle_deg = find_number(path, line, entry, base::kLargestAngle_deg);
+  if (angle_deg.value_or(0.0) == 0.0) return;
+  const AxisAngle stated{*angle_deg, line.number};
+  if (!axes.rotation)
+    axes.rotation = stated;
+  else if (!axes.other_rotation && are_two_axes(*axes.rotation, *angle_deg))
+    axes.other_rotation = stated;
+}
+
 // The entries of a section that have been read: a second one must say the same.
 class EntriesOfSection {
  public:
@@ -286,7 +314,10 @@ bool read_common_entry(const std::filesystem::path& path, const TextLine& line,
     if (before_A == 0.0) mdoc.pixel_spacing_A = spacing_A;
   } else if (entry.key == "TiltAxisAngle") {
     const double axis_deg = require_number(path, line, entry.value, base::kLargestAngle_deg);
-    if (!axes.entry) axes.entry = AxisAngle{axis_deg, line.number};
+    const AxisAngle stated{axis_deg, line.number};
+    if (axes.entry && are_two_axes(*axes.entry, axis_deg))
+      throw_two_axes(path, entry.key, *axes.entry, stated);
+    if (!axes.entry) axes.entry = stated;
   } else if (entry.key == "Voltage") {
     const auto voltage_kV = parse_voltage_kV(path, line, entry.value);
     if (voltage_kV && mdoc.voltage_kV)
@@ -340,9 +371,7 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
     }
     const KeyValue entry = split_key_value(line.text);
     if (entry.value.empty()) continue;  // Leginon writes entries without a value
-    if (entry.key == "RotationAngle" && !axes.rotation)
-      if (const auto angle_deg = find_number(path, line, entry, base::kLargestAngle_deg))
-        axes.rotation = AxisAngle{*angle_deg, line.number};
+    if (entry.key == "RotationAngle") read_rotation(path, line, entry, axes);
     if (part == Part::kOther) continue;
     if (part == Part::kSection) entries.require_new(path, line, entry);
     if (read_common_entry(path, line, entry, axes, mdoc)) continue;
@@ -357,7 +386,7 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
   }
   sort_and_require_unique(path, &mdoc);
   require_no_pieces(path, mdoc);
-  choose_axis(axes, mdoc);
+  choose_axis(path, axes, mdoc);
   mdoc.two_directions_line = axes.two_directions_line;
   return mdoc;
 }

@@ -112,6 +112,22 @@ TEST(Mdoc, FilesAreNamedWithoutTheirFolders) {
   EXPECT_EQ(mdoc.sections[1].frame_name, "a_2.tif");
 }
 
+TEST(Mdoc, SectionsThatStateTwoAxesAreRefused) {
+  const ScratchDirectory scratch;
+  const auto read = [&](const std::string& key, const char* first, const char* second) {
+    return read_mdoc(scratch.write(
+        "a.mdoc", fmt::format("[ZValue = 0]\n{0} = {1}\n[ZValue = 1]\n{0} = {2}\n[ZValue = 2]\n"
+                              "{0} = {2}\n",
+                              key, first, second)));
+  };
+  EXPECT_EQ(read("TiltAxisAngle", "85", "85.4").tilt_axis_deg->value, 85.0);
+  EXPECT_EQ(read("RotationAngle", "0", "175").lone_rotation_deg->value, 175.0);  // 0: no angle
+  for (const char* key : {"TiltAxisAngle", "RotationAngle"})
+    expect_parts(message_of<Error>([&] { read(key, "20", "85"); }),
+                 {"a.mdoc", "line 4", key, "85", "20", "line 2"});
+  expect_parts(message_of<Error>([&] { read("TiltAxisAngle", "0", "85"); }), {"line 4", "line 2"});
+}
+
 TEST(Mdoc, ReadsTheAxisOfTomographyByRotationAngle) {
   const ScratchDirectory scratch;
   const auto read = [&](const char* axis, const std::string& rotation) {

@@ -26,6 +26,10 @@ MtfTable read_mtf(const std::filesystem::path& path) {
                     "_rlnMtfValue",
                     path.string()));
   }
+  if (std::ranges::count_if(
+          tables, [](const StarTable& other) { return other.has_column("rlnMtfValue"); }) > 1)
+    throw Error(
+        fmt::format("'{}' has several tables with _rlnMtfValue: leave one of them", path.string()));
   MtfTable mtf;
   for (std::size_t i = 0; i < table->num_rows(); ++i) {
     const StarRow row(path, *table, i);

@@ -34,6 +34,10 @@ TEST(MtfTable, RefusesWhatIsNoTransferFunction) {
   expect_parts(refusal(kHead + "0 1\n0.2 0.9\n0.1 0.8\n"), {"row 3", "0.1", "must rise"});
   expect_parts(refusal(kHead + "0 1\n0.2 -0.9\n"), {"row 2", "-0.9"});
   expect_parts(refusal(kHead + "0 1\n"), {"fewer than two"});
+  expect_parts(
+      refusal(kHead + "0 1\n0.5 0.3\n\ndata_other\n\nloop_\n_rlnResolutionInversePixel #1\n"
+                      "_rlnMtfValue #2\n0 1\n0.5 0.2\n"),
+      {"mtf.star", "several tables"});
 }
 
 }  // namespace

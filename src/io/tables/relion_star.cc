@@ -74,22 +74,23 @@ StatedOptics optics_by(const Find& find) {
           pixel_size_by(find)};
 }
 
-// Returns the number in all rows of whichever table has the column. Throws Error if they differ.
+// Returns the number in all rows of all tables that have the column. Throws Error if they differ.
 std::optional<double> only_number(const std::filesystem::path& path,
                                   const std::vector<StarTable>& tables, std::string_view column) {
-  const StarTable* const table = find_table(tables, column);
-  if (table == nullptr || table->num_rows() == 0) return std::nullopt;
-  const auto in_row = [&](std::size_t i) { return StarRow(path, *table, i).find_number(column); };
-  const auto first = in_row(0);
-  for (std::size_t i = 1; i < table->num_rows(); ++i) {
-    const auto other = in_row(i);
-    if (other.has_value() == first.has_value() && (!other || *other == *first)) continue;
-    throw Error(
-        fmt::format("'{}': _{} of row {} is another than that of row 1, and a series has "
-                    "one: correct it",
-                    path.string(), column, i + 1));
+  std::optional<std::optional<double>> only;
+  for (const StarTable& table : tables) {
+    if (!table.has_column(column)) continue;
+    for (std::size_t i = 0; i < table.num_rows(); ++i) {
+      const auto number = StarRow(path, table, i).find_number(column);
+      if (!only) only = number;
+      if (*only == number) continue;
+      throw Error(
+          fmt::format("'{}': _{} of row {} is another than one before, and a series has one: "
+                      "correct it",
+                      path.string(), column, i + 1));
+    }
   }
-  return first;
+  return only.value_or(std::nullopt);
 }
 
 // Returns the table with a column, or null. Throws Error if several have it.
