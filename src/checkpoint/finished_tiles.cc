@@ -50,11 +50,20 @@ void FinishedTiles::read() {
     throw Error(fmt::format("'{}' was made with --budget {}: give the same", path, text("budget")));
   try {
     tiles_ = tiles_from(text("tiles"), series_.roi.height());
+    require_whole_leaves();
     compact::require_sound(*model.coded);
   } catch (const std::exception& error) {
     throw Error(fmt::format("'{}' is damaged: {}", path, error.what()));
   }
   coded_ = std::move(model.coded);
+}
+
+void FinishedTiles::require_whole_leaves() const {
+  const int leaf_rows = *options_.field.leaf_size;
+  for (const FinishedTile& tile : tiles_)
+    if (tile.rows.end % leaf_rows != 0 && tile.rows.end != series_.roi.height())
+      throw Error(fmt::format("a tile ends at row {}, where no leaf of {} rows does", tile.rows.end,
+                              leaf_rows));
 }
 
 void FinishedTiles::add(const FinishedTile& tile, compact::CodedField coded) {

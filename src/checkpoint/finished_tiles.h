@@ -47,6 +47,8 @@ class FinishedTiles {
  private:
   bool writes_file() const { return !options_.run.output.empty(); }
   void read();
+  /// Throws Error for a tile that ends within a leaf.
+  void require_whole_leaves() const;
 
   const options::ReconstructOptions& options_;
   const measurement::Measurement& series_;

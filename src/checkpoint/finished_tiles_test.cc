@@ -72,7 +72,7 @@ TEST_F(FinishedTilesTest, AreRefusedIfSomebodyHasChangedThem) {
   std::vector<json> damaged = {json::array(),    json::object(),
                                nullptr,          "text",
                                json::array({1}), json::array({tile(0, 32), tile(64, 96)})};
-  for (const auto& [begin, end] : {std::pair(0, 128), {0, 200}, {1, 64}, {0, 0}, {64, 0}})
+  for (const auto& [begin, end] : {std::pair(0, 128), {0, 200}, {0, 33}, {1, 64}, {0, 0}, {64, 0}})
     damaged.push_back(json::array({tile(begin, end)}));
   for (const double change : {1e30, -0.1}) {
     json changed = tile(0, 64);

@@ -293,8 +293,13 @@ class ModelReader {
 
   void read_decoder(const StoredGroup& group, field::Field& field) const {
     field.bias = static_cast<float>(group.number("bias", base::kLargestNumber));
-    field.activation.beta =
-        static_cast<float>(group.number("softplus_beta", {0, base::kLargestNumber}));
+    // 0: no activation. It divides, so a number just above 0 makes densities infinite.
+    constexpr double kSmallestBeta = 1e-6, kLargestBeta = 1e6;
+    const double beta = group.number("softplus_beta", {0, kLargestBeta});
+    if (beta != 0 && beta < kSmallestBeta)
+      fail(fmt::format("its softplus_beta of {:g} is neither 0 nor from {:g} to {:g}", beta,
+                       kSmallestBeta, kLargestBeta));
+    field.activation.beta = static_cast<float>(beta);
   }
 
   std::unique_ptr<field::Field> read_field(const StoredGroup& group,

@@ -323,6 +323,7 @@ TEST(ModelFile, RefusesWhatIsConsistentHdf5ButNoSoundModel) {
       {"f['geometry'].attrs['thickness'] = 43.0", "thickness of its field"},
       {"f.attrs.modify('density_unit', 0.0)", "density_unit"},
       {"f.attrs.modify('density_unit', -40.0)", "density_unit"},
+      {"f['field'].attrs.modify('softplus_beta', 1e-40)", "softplus_beta"},
       {"f.attrs.modify('density_unit', 1e-300)", "density_unit"},
       {"f['field/leaves/node'][2] = 1", "leaves"},
       {"f['field/leaves/offset'][2] = 16", "index of its parameters"},

@@ -32,8 +32,8 @@ void require_plausible_scale(std::span<const ViewCheck> found, const std::string
     return part_not_finite(view, num_pixels) > kMaxPartNotFinite;
   };
   const char* const advice =
-      "its numbers are in a scale that cannot be used, or it is damaged: multiply the stack by a "
-      "factor";
+      "fill or crop what is empty in all views, or, if its numbers are in a scale that cannot be "
+      "used, multiply the stack by a factor";
   if (std::ranges::all_of(found, is_beyond))
     throw Error(
         fmt::format("in every view of '{}' more than 1 % of the pixels are NaN, infinite or beyond "
