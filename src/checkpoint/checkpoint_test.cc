@@ -162,6 +162,8 @@ TEST_F(Checkpoint, AStateThatTheSeriesAndTheOptionsCannotHaveIsRefused) {
       [&](State& s) { s.doubles["epoch_sums"][1] = nan; },
       [&](State& s) { s.doubles["epoch_sums"][6] = nan; },  // the limited squares of the first view
       [](State& s) { s.doubles["data_loss"].clear(); },
+      [](State& s) { std::ranges::fill(s.doubles["data_loss"], 1e300); },
+      [](State& s) { std::ranges::fill(s.doubles["data_loss"], std::nan("")); },
       [](State& s) { s.doubles["view_residual"].resize(1); },
       [](State& s) { s.doubles["view_residual"].assign(s.doubles["view_residual"].size(), -1); },
       [](State& s) { s.doubles["held_out_error"] = {1}; },

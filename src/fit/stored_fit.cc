@@ -74,7 +74,10 @@ std::string Fit::fault_of(const Progress& progress, const field::Field& field) c
   if (progress.data_loss.size() != epochs_done)
     return fmt::format("it has the losses of {} of {} epochs", progress.data_loss.size(),
                        epochs_done);
-  const auto is_residual = [](double r) { return std::isfinite(r) && r >= 0; };
+  constexpr double kLargestResidual = 1e30;
+  const auto is_residual = [](double r) { return r >= 0 && r <= kLargestResidual; };
+  if (!std::ranges::all_of(progress.data_loss, is_residual))
+    return fmt::format("it has no usable losses of {} epochs", epochs_done);
   if (progress.view_residual.size() != (epochs_done > 0 ? num_views : 0) ||
       !std::ranges::all_of(progress.view_residual, is_residual))
     return fmt::format("it has no usable residuals of {} views", num_views);

@@ -225,7 +225,8 @@ std::vector<double> round_ticks(double low, double high) {
 std::vector<Tick> log_ticks(double low, double high) {
   const bool has_many = high / low > 2e3;
   std::vector<Tick> ticks;
-  for (double decade = std::pow(10, std::floor(std::log10(low))); decade <= high; decade *= 10) {
+  for (double decade = std::pow(10, std::floor(std::log10(low)));
+       decade <= high && std::isfinite(decade); decade *= 10) {
     for (const double factor : {1.0, 2.0, 5.0}) {
       const double at = factor * decade;
       if (at < low || at > high || (has_many && factor > 1)) continue;
