@@ -420,7 +420,7 @@ if child == 0:
     except tomofield.Error as error:
         print(error, flush=True)
     sys.exit(5)
-for _ in range(500):
+for _ in range(3000):
     ended, status = os.waitpid(child, os.WNOHANG)
     if ended:
         print("status", os.waitstatus_to_exitcode(status))
