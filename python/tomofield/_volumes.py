@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core, _pictures
-from ._checks import (Path, array_of, as_array, chosen, count_of, is_masked, number_of, numbers_of, path_of,
-                      places_of, shown, switch_of, text_of, whole_number_of)
+from ._checks import (Path, array_of, as_array, chosen, count_of, is_masked, number_of, numbers_of,
+                      path_of, places_of, shown, switch_of, text_of, whole_number_of)
 from ._core import Error
 
 Array = npt.NDArray[np.float32]

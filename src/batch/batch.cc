@@ -32,16 +32,11 @@ constexpr double kGibibyte = 1 << 30;
 void warn_of_waiting_tasks(const fs::path& folder, const JobList& list) {
   if (!has_script(folder)) return;
   std::vector<std::string> waiting;
-  try {
-    for (const Job& job : read_jobs(list_of(folder)).jobs) {
-      const Progress progress = read_state(folder, job).progress;
-      if ((progress == Progress::kWaiting || progress == Progress::kRunning ||
-           progress == Progress::kStopped) &&
-          std::ranges::find(list.jobs, job.output, &Job::output) == list.jobs.end())
-        waiting.push_back(job.name);
-    }
-  } catch (const Error&) {
-    return;  // the list is damaged, or of an earlier version
+  for (const Job& job : find_jobs(list_of(folder))) {
+    const State state = read_state(folder, job);
+    if ((state.progress == Progress::kWaiting || has_begun(state)) &&
+        std::ranges::find(list.jobs, job.output, &Job::output) == list.jobs.end())
+      waiting.push_back(job.name);
   }
   if (waiting.empty()) return;
   base::log_warning(

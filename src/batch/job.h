@@ -64,6 +64,9 @@ void write_jobs(const std::filesystem::path& file, const JobList& list);
 void require_words(const JobList& list);
 /// Reads what write_jobs() has written. Throws Error for anything else.
 JobList read_jobs(const std::filesystem::path& file);
+/// Returns the jobs of an earlier batch; none if the file is not there, damaged, or of an earlier
+/// version.
+std::vector<Job> find_jobs(const std::filesystem::path& file);
 /// Returns the commands of a list that an earlier version may have written, by the names of their
 /// jobs. Throws Error, with what to do, if there are none.
 std::map<std::string, std::vector<std::string>> read_commands(const std::filesystem::path& file);

@@ -116,6 +116,14 @@ JobList read_jobs(const fs::path& file) {
   });
 }
 
+std::vector<Job> find_jobs(const fs::path& file) {
+  try {
+    return read_jobs(file).jobs;
+  } catch (const Error&) {
+    return {};
+  }
+}
+
 std::map<std::string, std::vector<std::string>> read_commands(const fs::path& file) {
   const auto read = [](const json& list) {
     std::map<std::string, std::vector<std::string>> commands;

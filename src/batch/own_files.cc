@@ -31,11 +31,7 @@ struct OwnFile {
 // Returns the names of the series of an earlier batch, or none if it has no list that can be read.
 std::set<std::string> earlier_series(const fs::path& folder) {
   std::set<std::string> names;
-  try {
-    for (const Job& job : read_jobs(list_of(folder)).jobs) names.insert(job.name);
-  } catch (const Error&) {
-    // There is no list, or it is of something else.
-  }
+  for (const Job& job : find_jobs(list_of(folder))) names.insert(job.name);
   return names;
 }
 

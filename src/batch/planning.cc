@@ -18,7 +18,6 @@
 #include "batch/series_list.h"
 #include "batch/slurm.h"
 #include "batch/state_record.h"
-#include "io/is_file.h"
 #include "io/saving/output_folder.h"
 
 namespace tomofield::batch {
@@ -80,15 +79,11 @@ void warn_of_missing_rows(const std::vector<std::string>& names) {
 // Returns the outputs of a stopped batch with --overwrite that are still those of before it.
 std::set<fs::path> outputs_to_replace(const PlanOptions& options) {
   std::set<fs::path> outputs;
-  if (!options.skips_existing || !io::is_file(list_of(options.folder))) return outputs;
-  try {
-    for (const Job& job : read_jobs(list_of(options.folder)).jobs) {
-      const Progress progress = read_state(options.folder, job).progress;
-      if (job.replaces && progress != Progress::kDone && progress != Progress::kSkipped)
-        outputs.insert(fs::absolute(job.output).lexically_normal());
-    }
-  } catch (const Error&) {
-    // The list is damaged, or of an earlier version.
+  if (!options.skips_existing) return outputs;
+  for (const Job& job : find_jobs(list_of(options.folder))) {
+    const Progress progress = read_state(options.folder, job).progress;
+    if (job.replaces && progress != Progress::kDone && progress != Progress::kSkipped)
+      outputs.insert(fs::absolute(job.output).lexically_normal());
   }
   return outputs;
 }

@@ -13,7 +13,7 @@ namespace {
 std::string to_text(const Grid& grid) {
   return fmt::format(
       "{} × {} × {} voxels{}", grid.size[0], grid.size[1], grid.size[2],
-      evaluate::is_known_voxel_size(grid.voxel_A) ? fmt::format(" of {:.4g} Å", grid.voxel_A) : "");
+      io::is_known_size(grid.voxel_A) ? fmt::format(" of {:.4g} Å", grid.voxel_A) : "");
 }
 
 }  // namespace

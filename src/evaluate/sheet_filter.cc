@@ -12,7 +12,7 @@
 #include "base/gaussian_kernel.h"
 #include "base/threads/parallel.h"
 #include "base/utf8.h"
-#include "evaluate/volume_pair.h"
+#include "io/images/mrc_format.h"
 #include "tomofield/error.h"
 
 namespace tomofield::evaluate {
@@ -112,7 +112,7 @@ base::Volume sheet_response(const base::Volume& volume, double sigma_px) {
 
 DetectionScore membrane_score(const base::Volume& volume, const base::Volume& label) {
   TOMOFIELD_CHECK(volume.shape == label.shape, "the label has another shape than the volume");
-  if (!is_known_voxel_size(label.voxel_size_A))
+  if (!io::is_known_size(label.voxel_size_A))
     throw Error("the label of membranes has no voxel size, which the filter for sheets needs");
   const auto num_bad =
       std::ranges::count_if(label.data, [](float value) { return !std::isfinite(value); });

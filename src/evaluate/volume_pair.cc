@@ -112,10 +112,8 @@ void check_box(const base::Box& box, const base::Box& common, const io::MrcReade
 
 }  // namespace
 
-bool is_known_voxel_size(double voxel_A) { return voxel_A > 0.0 && voxel_A != 1.0; }
-
 bool voxel_sizes_differ(double first_A, double second_A, double tolerance) {
-  return is_known_voxel_size(first_A) && is_known_voxel_size(second_A) &&
+  return io::is_known_size(first_A) && io::is_known_size(second_A) &&
          std::abs(first_A - second_A) > tolerance * second_A;
 }
 

@@ -13,8 +13,6 @@ namespace tomofield::evaluate {
 /// The numbers of voxels along x, y and z.
 using VolumeSizes = std::array<std::int64_t, 3>;
 
-/// Returns false for 0 and 1 Å, which programs write that do not know the voxel size.
-bool is_known_voxel_size(double voxel_A);
 /// Returns true if both voxel sizes (Å) are known and differ by more than `tolerance` times the
 /// second.
 bool voxel_sizes_differ(double first_A, double second_A, double tolerance);

@@ -391,6 +391,21 @@ void require_rings(const tilt_series::PlannedSeries& series, const tilt_series::
                   largest_A * 1e-4, view.section + 1, spread_px, pixel_A, side));
 }
 
+// Warns of corrections that a stack has had, as its labels say, and that are applied all the same.
+void warn_of_labels(const io::ImageStack& stack, bool corrects_ctf, bool corrects_dose) {
+  if (corrects_ctf && io::is_in_labels(stack.header(), "ctfphaseflip"))
+    base::log_warning(fmt::format(
+        "'{}' went through ctfphaseflip, as its header says, and its views count as not corrected: "
+        "give --ctf-phase-flipped",
+        stack.name()));
+  // IMOD's mtffilter writes "MTFFILTER: Dose weight filtered".
+  if (corrects_dose && io::is_in_labels(stack.header(), "dose weight"))
+    base::log_warning(fmt::format(
+        "'{}' is weighted by the dose already, as its header says, and its views count as not "
+        "weighted: give --dose-weighted",
+        stack.name()));
+}
+
 }  // namespace
 
 std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const ViewOptions& options) {
@@ -423,18 +438,8 @@ std::vector<microscope::ViewTransfer> view_transfers(const tilt_series::TiltSeri
   const Sections sections = sections_of(input, series);
   require_pixel_size(input, series, sections.stack);
   const auto ctf = find_ctf(files, options, sections);
-  if (ctf && !options.is_phase_flipped && io::is_in_labels(series.stack().header(), "ctfphaseflip"))
-    base::log_warning(fmt::format(
-        "'{}' went through ctfphaseflip, as its header says, and its views count as not corrected: "
-        "give --ctf-phase-flipped",
-        series.stack().name()));
   const auto exposures = find_exposures(files, options, sections);
-  // IMOD's mtffilter writes "MTFFILTER: Dose weight filtered".
-  if (exposures && io::is_in_labels(series.stack().header(), "dose weight"))
-    base::log_warning(fmt::format(
-        "'{}' is weighted by the dose already, as its header says, and its views count as not "
-        "weighted: give --dose-weighted",
-        series.stack().name()));
+  warn_of_labels(series.stack(), ctf && !options.is_phase_flipped, exposures.has_value());
   const auto detector = find_detector(files, series);
   if (!ctf && !exposures && !detector) return {};
   const microscope::Optics optics = find_optics(files, options, ctf, series);

@@ -81,7 +81,7 @@ void add_table_of(Project& project, const io::RelionTomogram& tomogram, const fs
   try {
     project.add_file(io::find_listed_file(tomogram.tilt_series_star, star));
   } catch (const Error&) {
-    // That of another series is not there.
+    // The table is not there, so no result replaces it.
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "io/images/image_stack.h"
 #include "io/images/mrc.h"
+#include "io/images/mrc_format.h"
 #include "io/is_file.h"
 #include "tilt_series/contradictions.h"
 #include "tilt_series/series_plan.h"
@@ -29,8 +30,6 @@ bool is_stack(const fs::path& path) {
 
 }  // namespace
 
-bool is_known_size(double in_header_A) { return in_header_A != 0.0 && in_header_A != 1.0; }
-
 std::optional<fs::path> find_stack_beside(const fs::path& file, const std::string& named) {
   fs::path stem = file;
   stem.replace_extension();
@@ -44,12 +43,12 @@ std::optional<fs::path> find_stack_beside(const fs::path& file, const std::strin
 
 bool are_other_pixels(double stated_A, double in_header_A) {
   constexpr double kCalibration = 0.1;
-  return is_known_size(in_header_A) && std::fabs(stated_A / in_header_A - 1.0) > kCalibration;
+  return io::is_known_size(in_header_A) && std::fabs(stated_A / in_header_A - 1.0) > kCalibration;
 }
 
 void set_stated_pixel_size(Project& project, const StatedPixelSize& stated, double in_header_A) {
   if (project.ignores(stated.entry)) return;
-  if (!is_known_size(in_header_A)) {
+  if (!io::is_known_size(in_header_A)) {
     project.set("--pixel-size", fmt::format("{:.6g}", stated.size_A), stated.file, stated.entry);
   } else if (are_other_pixels(stated.size_A, in_header_A)) {
     project.warn(

@@ -22,9 +22,6 @@ struct StatedPixelSize {
   double size_A = 0.0;
 };
 
-/// Tells whether the pixel size of a header is one. Programs that do not know it write 0, or 1.
-bool is_known_size(double in_header_A);
-
 /// Sets --pixel-size to what a file states if the header of the stack has no size (`in_header_A` is
 /// 0 or 1). Warns if both differ by more than a tenth, which no calibration changes.
 void set_stated_pixel_size(Project& project, const StatedPixelSize& stated, double in_header_A);

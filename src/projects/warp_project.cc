@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "io/images/mrc_format.h"
 #include "io/images/view_images.h"
 #include "io/tables/view_table.h"
 #include "projects/formats.h"
@@ -17,7 +18,7 @@ double set_pixel_size(Project& project, const io::ViewTable& table) {
   const double in_header_A = io::open_image_stack(table.file)->header().voxel_size_A[0];
   const auto stated_A = table.optics.pixel_size_A;
   if (!stated_A || project.ignores(kEntry)) return in_header_A;
-  const bool is_known = is_known_size(in_header_A);
+  const bool is_known = io::is_known_size(in_header_A);
   // Beside a contrast transfer, the size for which its defocus holds is compared there.
   if (!is_known || !io::has_defocus(table))
     set_stated_pixel_size(project, {table.file, kEntry, *stated_A}, in_header_A);

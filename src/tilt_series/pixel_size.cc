@@ -116,12 +116,12 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& s
   }
   require_square_pixels(stack);
   const double in_header_A = stack.header().voxel_size_A[0];
-  const bool is_default = in_header_A == 0.0 || in_header_A == 1.0;
-  if (is_default && mdoc) {
+  const bool is_known = io::is_known_size(in_header_A);
+  if (!is_known && mdoc) {
     const double stated_A = pixel_size_of_mdoc(*mdoc, *options.mdoc, stack);
     if (stated_A > 0.0) return stated_A;
   }
-  if (in_header_A > 0.0 && !is_default) {
+  if (is_known) {
     if (mdoc) warn_of_other_size(*mdoc, *options.mdoc, stack);
     return in_header_A;
   }

@@ -89,7 +89,8 @@ InPlaneAlignment alignment_of_axis(double axis_deg, const io::ImageStack& stack)
   return alignment;
 }
 
-/// Returns the axis of a table of views that are not aligned yet.
+/// Returns the axis of a table of views that are not aligned yet. Throws Error if it states
+/// several.
 StatedAxis nominal_axis(const SectionTable& table) {
   const auto first = std::ranges::find_if(table.of_section,
                                           [](const auto& section) { return section.has_value(); });

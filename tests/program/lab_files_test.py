@@ -681,25 +681,24 @@ def test_another_axis_in_the_header_is_named():
     expect(dry(folder, "TS_01.mrc", "--mdoc", "TS_01.mdoc"), "85.3", "--tilt-axis")
 
 
+def said_of_label(label, *options):
+    """Returns what a short run says of a stack with this label."""
+    folder = write_series("label")
+    write_titles(os.path.join(folder, "TS_01.mrc"), [label])
+    return harness.succeed("reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--thickness", 24, "--epochs", 1,
+                           "--coarse-epochs", 0, "--tv", 5, "--tv-penalty", "smooth", "--prior", "tv",
+                           "-o", "out.mrc", *options, cwd=folder).stderr
+
+
 def test_a_stack_that_was_phase_flipped_is_named():
-    folder = write_series("flipped")
-    with mrcfile.open(os.path.join(folder, "TS_01.mrc"), "r+") as file:
-        file.header.label[0], file.header.nlabl = "ctfPhaseFlip: CTF correction", 1
-    words = ["reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--defocus", 3, "--thickness", 24,
-             "--epochs", 1, "--coarse-epochs", 0, "--tv", 5, "--tv-penalty", "smooth", "--prior", "tv",
-             "--overwrite", "-o", "out.mrc"]
-    expect(harness.succeed(*words, cwd=folder).stderr, "ctfphaseflip", "--ctf-phase-flipped")
-    assert "ctfphaseflip" not in harness.succeed(*words, "--ctf-phase-flipped", cwd=folder).stderr
+    words = ["ctfPhaseFlip: CTF correction", "--defocus", 3]
+    expect(said_of_label(*words), "ctfphaseflip", "--ctf-phase-flipped")
+    assert "ctfphaseflip" not in said_of_label(*words, "--ctf-phase-flipped")
 
 
 def test_a_stack_that_was_weighted_by_the_dose_is_named():
-    folder = write_series("weighted")
-    with mrcfile.open(os.path.join(folder, "TS_01.mrc"), "r+") as file:
-        file.header.label[0], file.header.nlabl = "MTFFILTER: Dose weight filtered", 1
-    words = ["reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--dose-per-tilt", 3, "--thickness", 24,
-             "--epochs", 1, "--coarse-epochs", 0, "--tv", 5, "--tv-penalty", "smooth", "--prior", "tv",
-             "--overwrite", "-o", "out.mrc"]
-    expect(harness.succeed(*words, cwd=folder).stderr, "weighted by the dose already", "--dose-weighted")
+    expect(said_of_label("MTFFILTER: Dose weight filtered", "--dose-per-tilt", 3),
+           "weighted by the dose already", "--dose-weighted")
 
 
 @pytest.mark.parametrize("kind, low, high, said", [

@@ -46,8 +46,8 @@ struct MrcHeader {
   std::optional<double> extended_axis_deg;
   std::optional<double> extended_voltage_kV;  ///< of the microscope, in the extended header
   std::optional<double> extended_pixel_A;     ///< width of a pixel, in the extended header
-  /// What the extended header states for one section and not for another, for messages: "pixels in
-  /// Å of 7 in section 2, and of 3.5 in the first". Empty: nothing.
+  /// Says for messages in what the sections of the extended header differ: "pixels in Å of 7 in
+  /// section 2, and of 3.5 in the first". It is empty if they do not.
   std::string extended_difference;
   bool has_pieces = false;  ///< by the extended header: sections are the pieces of montages
   std::vector<std::string> labels;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/plausible.h"
+#include "io/images/mrc_format.h"
 
 namespace tomofield::io {
 namespace {
@@ -56,8 +57,7 @@ void take_tilts(std::vector<double> tilts_deg, MrcHeader& header) {
 void take_pixel_size(double width_A, double height_A, MrcHeader& header) {
   if (!base::is_plausible_pixel_size(width_A)) return;
   header.extended_pixel_A = width_A;
-  const bool has_one = header.voxel_size_A[0] != 0.0 && header.voxel_size_A[0] != 1.0;
-  if (has_one) return;
+  if (is_known_size(header.voxel_size_A[0])) return;
   header.voxel_size_A = {width_A, height_A, width_A};
 }
 

@@ -407,6 +407,8 @@ std::optional<MrcFacts> find_mrc_facts(const std::filesystem::path& path, const 
                   beyond / (header.nx * header.ny * width)};
 }
 
+bool is_known_size(double size_A) { return size_A > 0.0 && size_A != 1.0; }
+
 double cubic_voxel_size_A(const MrcHeader& header, const std::filesystem::path& path) {
   constexpr double kSame = 0.01;  // of calibrations
   const auto& [x_A, y_A, z_A] = header.voxel_size_A;

@@ -90,6 +90,10 @@ struct MrcFacts {
 /// of this header, but a TIFF file, a table that names images, or the name of a stack in memory.
 std::optional<MrcFacts> find_mrc_facts(const std::filesystem::path& path, const MrcHeader& header);
 
+/// Tells whether the pixel or voxel size of a header is one. Programs that do not know it write 0,
+/// or 1.
+bool is_known_size(double size_A);
+
 /// Returns the side of the voxels of a volume, or 0 if it is not known. The size along z counts for
 /// nothing in a stack of images where it is 0 or 1. Throws Error for voxels that are no cubes.
 double cubic_voxel_size_A(const MrcHeader& header, const std::filesystem::path& path);

@@ -28,20 +28,26 @@ std::vector<fs::path>& other_inputs() {
 // cannot be found, none are added: the error says so when they are opened.
 void add_listed_images(const fs::path& stack, const std::optional<fs::path>& mdoc,
                        std::vector<fs::path>& files) {
-  const auto add = [&](const auto& find) {
+  const auto add = [&](const std::vector<ImageInFile>& images) {
+    for (const ImageInFile& image : images) files.push_back(image.file);
+  };
+  const auto if_found = [](const auto& find) {
     try {
-      for (const ImageInFile& image : find()) files.push_back(image.file);
+      find();
     } catch (const Error&) {
     }
   };
   std::error_code failed;
   if (is_view_table(stack)) {
-    for (const Frames frames : {Frames::kAll, Frames::kEven, Frames::kOdd})
-      add([&] { return find_view_images(read_view_table(stack), frames); });
+    if_found([&] {
+      const ViewTable table = read_view_table(stack);
+      for (const Frames frames : {Frames::kAll, Frames::kEven, Frames::kOdd})
+        if_found([&] { add(find_view_images(table, frames)); });
+    });
   } else if (stack.extension() == ".mdoc") {
-    add([&] { return find_mdoc_images(stack, stack.parent_path()); });
+    if_found([&] { add(find_mdoc_images(stack, stack.parent_path())); });
   } else if (mdoc && fs::is_directory(stack, failed)) {
-    add([&] { return find_mdoc_images(*mdoc, stack); });
+    if_found([&] { add(find_mdoc_images(*mdoc, stack)); });
   }
 }
 

@@ -18,7 +18,7 @@ constexpr double kLargestFrequency = 1.0;  // some tables go beyond ½
 
 MtfTable read_mtf(const std::filesystem::path& path) {
   const std::vector<StarTable> tables = read_star_file(path);
-  const StarTable* const table = find_table(tables, "rlnMtfValue");
+  const StarTable* const table = find_only_table(path, tables, "rlnMtfValue");
   if (table == nullptr) {
     throw Error(
         fmt::format("'{}' has no column _rlnMtfValue: give the detector's transfer function as "
@@ -26,10 +26,6 @@ MtfTable read_mtf(const std::filesystem::path& path) {
                     "_rlnMtfValue",
                     path.string()));
   }
-  if (std::ranges::count_if(
-          tables, [](const StarTable& other) { return other.has_column("rlnMtfValue"); }) > 1)
-    throw Error(
-        fmt::format("'{}' has several tables with _rlnMtfValue: leave one of them", path.string()));
   MtfTable mtf;
   for (std::size_t i = 0; i < table->num_rows(); ++i) {
     const StarRow row(path, *table, i);

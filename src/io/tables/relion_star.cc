@@ -93,16 +93,6 @@ std::optional<double> only_number(const std::filesystem::path& path,
   return only.value_or(std::nullopt);
 }
 
-// Returns the table with a column, or null. Throws Error if several have it.
-const StarTable* find_only_table(const std::filesystem::path& path,
-                                 const std::vector<StarTable>& tables, std::string_view column) {
-  const auto has_column = [&](const StarTable& table) { return table.has_column(column); };
-  if (std::ranges::count_if(tables, has_column) > 1)
-    throw Error(
-        fmt::format("'{}' has several tables with _{}: leave one of them", path.string(), column));
-  return find_table(tables, column);
-}
-
 // Returns the table that lists views.
 const StarTable& rows_of_views(const std::filesystem::path& path,
                                const std::vector<StarTable>& tables) {

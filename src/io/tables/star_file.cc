@@ -152,6 +152,15 @@ const StarTable* find_table(const std::vector<StarTable>& tables, std::string_vi
   return found == tables.end() ? nullptr : &*found;
 }
 
+const StarTable* find_only_table(const std::filesystem::path& path,
+                                 const std::vector<StarTable>& tables, std::string_view column) {
+  const auto has_column = [&](const StarTable& table) { return table.has_column(column); };
+  if (std::ranges::count_if(tables, has_column) > 1)
+    throw Error(
+        fmt::format("'{}' has several tables with _{}: leave one of them", path.string(), column));
+  return find_table(tables, column);
+}
+
 void require_star_text(const std::string& value) { star_text(value); }
 
 std::string star_file_text(const StarTable& table) {

@@ -48,6 +48,10 @@ std::vector<StarTable> read_star_file(const std::filesystem::path& path);
 /// Returns the first table that has a column, or nothing.
 const StarTable* find_table(const std::vector<StarTable>& tables, std::string_view column);
 
+/// Returns the only table of a file that has a column, or null. Throws Error if several have it.
+const StarTable* find_only_table(const std::filesystem::path& path,
+                                 const std::vector<StarTable>& tables, std::string_view column);
+
 /// Throws Error for a text that no STAR file can hold, even in quotes.
 void require_star_text(const std::string& value);
 

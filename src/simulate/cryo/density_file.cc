@@ -7,7 +7,7 @@
 
 #include "base/statistics.h"
 #include "evaluate/box.h"
-#include "evaluate/volume_pair.h"
+#include "io/images/mrc_format.h"
 #include "tomofield/error.h"
 
 namespace tomofield::simulate {
@@ -57,7 +57,7 @@ Gaussian cube_at(const base::Volume& map, const std::array<std::int64_t, 3>& fir
 std::vector<Gaussian> read_density(const std::filesystem::path& path) {
   const base::Volume map = evaluate::read_volume(path);
   const double voxel_A = map.voxel_size_A;
-  if (!evaluate::is_known_voxel_size(voxel_A))
+  if (!io::is_known_size(voxel_A))
     throw Error(fmt::format("'{}' has no voxel size: set that of its header", path.string()));
   double solvent = 0.0;
   const double unit_V = potential_of_unit(map, path, solvent);
