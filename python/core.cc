@@ -14,10 +14,8 @@
 #include <tomofield/version.h>
 #include <tomofield/volume_file.h>
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -113,6 +111,7 @@ auto run_with(py::object callback, const Work& work) {
     const Unlocked unlocked(Unlocked::Stops::kByCallback);
     return work(listener.callback());
   }();
+  if (must_stop()) throw InterpreterEnds();
   check_signals();
   return made;
 }
@@ -336,11 +335,7 @@ void add_reconstruct(py::module_& module) {
   module.def("method_options", &method_options);
   module.def("shared_options", &shared_options);
   module.def("nearest_names", &base::nearest_names);
-  module.def("set_thread_count", [](std::int64_t count) {
-    using Limits = std::numeric_limits<int>;
-    set_thread_count(
-        static_cast<int>(std::clamp<std::int64_t>(count, Limits::min(), Limits::max())));
-  });
+  module.def("set_thread_count", &set_thread_count);
 }
 
 void add_model(py::module_& module) {
@@ -393,21 +388,22 @@ void add_evaluate(py::module_& module) {
            "Return where the correlation first falls below a threshold, in Å, or None.");
   module.def(
       "score_volume",
-      [](const Array<float>& volume, const Array<float>& truth) {
-        const Tomogram a = to_tomogram(volume, 1.0), b = to_tomogram(truth, 1.0);
+      [](const Array<float>& volume, const Array<float>& truth, double volume_A, double truth_A) {
+        const Tomogram a = to_tomogram(volume, volume_A), b = to_tomogram(truth, truth_A);
         const Unlocked unlocked;
         return score_volume(a, b);
       },
-      py::arg("volume").noconvert(), py::arg("truth").noconvert());
+      py::arg("volume").noconvert(), py::arg("truth").noconvert(), py::arg("volume_A"),
+      py::arg("truth_A"));
   module.def(
       "correlate_shells",
-      [](const Array<float>& first, const Array<float>& second, double voxel_size_A) {
-        const Tomogram a = to_tomogram(first, voxel_size_A);
-        const Tomogram b = to_tomogram(second, voxel_size_A);
+      [](const Array<float>& first, const Array<float>& second, double first_A, double second_A) {
+        const Tomogram a = to_tomogram(first, first_A), b = to_tomogram(second, second_A);
         const Unlocked unlocked;
         return correlate_shells(a, b);
       },
-      py::arg("first").noconvert(), py::arg("second").noconvert(), py::arg("voxel_size_A"));
+      py::arg("first").noconvert(), py::arg("second").noconvert(), py::arg("first_A"),
+      py::arg("second_A"));
 }
 
 }  // namespace
@@ -419,6 +415,8 @@ PYBIND11_MODULE(_core, module) {
   pybind11::register_exception_translator([](std::exception_ptr raised) {
     try {
       if (raised) std::rethrow_exception(raised);
+    } catch (const python::InterpreterEnds&) {
+      python::InterpreterEnds::raise();
     } catch (const std::filesystem::filesystem_error& error) {
       const auto type = pybind11::module_::import("tomofield._core").attr("Error");
       const std::string said =

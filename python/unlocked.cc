@@ -9,6 +9,7 @@
 #include <condition_variable>
 #include <exception>
 #include <mutex>
+#include <thread>
 #include <utility>
 
 #include "base/progress.h"
@@ -23,10 +24,11 @@ namespace py = pybind11;
 struct Calls {
   std::mutex mutex;
   std::condition_variable has_changed;
-  int count = 0;          // guarded by the mutex, as are the next ones
-  int in_user_code = 0;   // of these calls
-  bool is_over = false;   // the interpreter ends
-  bool are_left = false;  // and waits for none of them any more
+  int count = 0;           // guarded by the mutex, as are the next ones
+  int in_user_code = 0;    // of these calls
+  bool is_over = false;    // the interpreter ends
+  std::thread::id ending;  // the thread that ends it
+  bool are_left = false;   // and waits for none of them any more
 };
 
 // It is never destroyed: daemon threads live until the process ends.
@@ -76,6 +78,7 @@ void wait_for_calls() {
   const py::gil_scoped_release released;
   std::unique_lock lock(calls().mutex);
   calls().is_over = true;
+  calls().ending = std::this_thread::get_id();
   std::chrono::milliseconds in_user_code{0};
   while (!calls().has_changed.wait_for(lock, kStep, [] { return calls().count == 0; })) {
     const bool are_all = calls().count == calls().in_user_code;
@@ -92,7 +95,7 @@ void wait_for_calls() {
 
 Unlocked::Counted::Counted() {
   const std::lock_guard lock(calls().mutex);
-  if (calls().is_over) throw Error("the Python interpreter ends: nothing can be begun any more");
+  if (calls().is_over) throw InterpreterEnds();
   ++calls().count;
 }
 
@@ -139,7 +142,7 @@ Unlocked::~Unlocked() {
 void interrupt() {
   using Clock = std::chrono::steady_clock;
   static std::atomic<Clock::rep> next{0};
-  if (must_stop()) throw Error("the Python interpreter ends");
+  if (must_stop()) throw InterpreterEnds();
   const Clock::time_point now = Clock::now();
   Clock::rep due = next;
   if (now.time_since_epoch().count() < due ||
@@ -164,6 +167,18 @@ void check_signals() {
 bool must_stop() {
   const std::lock_guard lock(calls().mutex);
   return calls().is_over;
+}
+
+// Python prints nothing for a thread that SystemExit ends. What a daemon thread prints as the
+// interpreter ends may hold the lock of stderr for ever, which aborts the process.
+void InterpreterEnds::raise() {
+  const bool is_ending_thread = [] {
+    const std::lock_guard lock(calls().mutex);
+    return calls().ending == std::this_thread::get_id();
+  }();
+  if (!is_ending_thread) return PyErr_SetNone(PyExc_SystemExit);
+  const auto type = py::module_::import("tomofield._core").attr("Error");
+  PyErr_SetString(type.ptr(), "the Python interpreter ends: nothing can be begun any more");
 }
 
 void wait_at_exit() {

@@ -7,13 +7,20 @@
 
 namespace tomofield::python {
 
+/// The interpreter ends, and with it what runs in C++.
+class InterpreterEnds {
+ public:
+  /// Raises tomofield.Error in the thread that ends the interpreter, and SystemExit in all others.
+  static void raise();
+};
+
 /// Gives up the interpreter's lock while C++ works, and takes it back at the end.
 ///
 /// A daemon thread may be in C++ when the interpreter ends. Python would end that thread at its
 /// next wish for the lock, through C++ that cannot be unwound, and the process would abort. So the
 /// interpreter waits for all objects of this class before it ends (wait_at_exit()), reconstructions
 /// stop at their next step (must_stop()), other work at its next part, and none can be made
-/// afterwards: the constructor throws Error.
+/// afterwards: the constructor throws InterpreterEnds.
 class Unlocked {
  public:
   /// Where Ctrl-C and the end of the interpreter stop the work.

@@ -21,7 +21,8 @@ struct VolumeScores {
 };
 
 /// Scores a volume as `tomofield evaluate` does. Throws Error unless both have the same size, 7
-/// voxels or more along each axis, finite values, and a truth that reaches above 0.
+/// voxels or more along each axis, voxels of one size if both state it, finite values, and a truth
+/// that reaches above 0.
 VolumeScores score_volume(const Tomogram& volume, const Tomogram& truth);
 
 /// Fourier shell correlation, an entry a shell, from low to high frequencies.
@@ -33,7 +34,7 @@ struct ShellCorrelation {
 
 /// Correlates two volumes as `tomofield evaluate --fsc` does, under a window that falls to zero
 /// over the outer eighth of each axis. Voxel sizes are those of `second`. Throws Error unless both
-/// have the same size and finite values that are not constant.
+/// have the same size, voxels of one size, and finite values that are not constant.
 ShellCorrelation correlate_shells(const Tomogram& first, const Tomogram& second);
 
 /// Returns the resolution in Å at which the correlation first falls below `threshold`; none if it

@@ -17,7 +17,7 @@ from ._core import Error, Progress, VolumeScores, __version__
 from ._projects import Project, Setting, open_project
 from ._records import Record, read_metrics, read_record
 from ._runs import Reconstruction, align, baseline, denoise, reconstruct
-from ._volumes import Box, Model, Tomogram, _voxel_size, export, read_mrc, write_mrc
+from ._volumes import Box, Model, Tomogram, _own_voxel_size, _voxel_size, export, read_mrc, write_mrc
 from .options import Options
 
 __all__ = ["Box", "Error", "Model", "Options", "Progress", "Project", "Reconstruction", "Record",
@@ -46,7 +46,8 @@ class ShellCorrelation:
 
 def score_volume(volume: npt.ArrayLike, truth: npt.ArrayLike) -> VolumeScores:
     """Score a volume against the truth: PSNR and SSIM, raw and after the best scale and offset."""
-    return _core.score_volume(array_of(volume), array_of(truth))
+    return _core.score_volume(array_of(volume), array_of(truth), _own_voxel_size(volume),
+                              _own_voxel_size(truth))
 
 
 def correlate_shells(first: npt.ArrayLike, second: npt.ArrayLike,
@@ -56,7 +57,9 @@ def correlate_shells(first: npt.ArrayLike, second: npt.ArrayLike,
     voxel_size_A: side of a voxel in Å, which arrays need and a Tomogram has.
     """
     size = _voxel_size(voxel_size_A, first, second)
-    curve = _core.correlate_shells(array_of(first), array_of(second), size)
+    sizes = [size if voxel_size_A is not None else _own_voxel_size(volume) or size
+             for volume in (first, second)]
+    curve = _core.correlate_shells(array_of(first), array_of(second), *sizes)
     return ShellCorrelation(curve.frequency_per_A, curve.correlation, curve.voxels, curve)
 
 

@@ -236,6 +236,11 @@ def _voxel_size(given: Optional[float], *volumes: Any) -> float:
     raise Error("an array does not say how large its voxels are: give voxel_size_A, in Å")
 
 
+def _own_voxel_size(volume: Any) -> float:
+    """Return the size of a Tomogram's voxel; 0 for one that does not know it, and for an array."""
+    return volume.voxel_size_A if isinstance(volume, Tomogram) else 0.0
+
+
 def _plausible(size_A: float) -> float:
     """Return the size of a voxel if it can be one."""
     low, high = VOXEL_SIZES_A

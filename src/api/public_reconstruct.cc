@@ -100,12 +100,12 @@ void set_message_handler(MessageHandler handler) {
   });
 }
 
-void set_thread_count(int count) {
+void set_thread_count(std::int64_t count) {
   if (count < 0 || count > base::kMostThreads)
     throw Error(
         fmt::format("the number of threads must be from 1 to {}, or 0 for the default, not {}",
                     base::kMostThreads, count));
-  base::set_thread_count(count);
+  base::set_thread_count(static_cast<int>(count));
 }
 
 }  // namespace tomofield

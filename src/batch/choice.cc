@@ -9,6 +9,7 @@
 #include <map>
 
 #include "batch/slurm.h"
+#include "batch/state_record.h"
 
 namespace tomofield::batch {
 namespace {
@@ -111,6 +112,7 @@ std::vector<std::size_t> keep_begun_settings(const fs::path& folder,
     Job& job = jobs[i];
     const auto entry = begun.find(job.name);
     if (!takes_choice(job) || !has_checkpoint(job.output)) continue;
+    if (!continues(read_state(folder, job), job)) continue;  // the checkpoint is to be replaced
     if (entry == begun.end() && stored) continue;
     if (entry != begun.end()) {
       if (stored && entry->second != settings_words(stored->settings, job.needs))

@@ -164,10 +164,7 @@ fs::path output_of(const Series& series, const fs::path& folder) {
 }
 
 std::vector<std::string> command_of(const Series& series, const std::vector<GivenOption>& common) {
-  // A file called "-x.mrc" would be an option.
-  const bool looks_like_option = series.input.string().starts_with('-');
-  std::vector<std::string> words{"reconstruct",
-                                 (looks_like_option ? "." / series.input : series.input).string()};
+  std::vector<std::string> words{"reconstruct", base::file_word(series.input.string())};
   for (const GivenOption& option : common) {
     if (std::ranges::find(series.options, option.flag, &GivenOption::flag) == series.options.end())
       words.push_back(option_for(series, option, option.flag).word());

@@ -3,11 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <csignal>
-#include <cstdint>
 #include <memory>
-#include <optional>
 
 #include "batch/summary.h"
 #include "tomofield/error.h"
@@ -17,20 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::optional<std::int64_t> checkpoint_time_ns(const Job& job) {
-  const auto written = last_progress(job.output);
-  return written ? std::optional(written->time_since_epoch() / std::chrono::nanoseconds(1))
-                 : std::nullopt;
-}
-
-// Returns whether the session that begins continues an earlier one. If the job replaces results, a
-// checkpoint counts only if a session of this batch has left it.
-bool continues(const Job& job, const State& before) {
-  return can_resume(job.output) &&
-         (!job.replaces ||
-          (has_begun(before) && checkpoint_time_ns(job) != before.old_checkpoint_ns));
-}
-
 bool was_stopped(int status) {  // with a checkpoint
   return status == 128 + SIGTERM || status == 128 + SIGINT || status == 128 + SIGHUP;
 }
@@ -39,7 +22,7 @@ bool was_stopped(int status) {  // with a checkpoint
 
 RunningJob::Session RunningJob::begin(const RunOptions& options, const Job& job) {
   const State before = read_state(options.folder, job);
-  Session session{.resumes = continues(job, before), .state = {}};
+  Session session{.resumes = continues(before, job), .state = {}};
   if (session.resumes) session.state.costs = before.costs;
   session.state.old_checkpoint_ns =
       has_begun(before) ? before.old_checkpoint_ns : checkpoint_time_ns(job);

@@ -1,5 +1,6 @@
 #include "batch/state_record.h"
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 
@@ -11,6 +12,18 @@ namespace tomofield::batch {
 
 using nlohmann::json;
 namespace fs = std::filesystem;
+
+std::optional<std::int64_t> checkpoint_time_ns(const Job& job) {
+  const auto written = last_progress(job.output);
+  return written ? std::optional(written->time_since_epoch() / std::chrono::nanoseconds(1))
+                 : std::nullopt;
+}
+
+bool continues(const State& before, const Job& job) {
+  return can_resume(job.output) &&
+         (!job.replaces ||
+          (has_begun(before) && checkpoint_time_ns(job) != before.old_checkpoint_ns));
+}
 
 fs::path log_folder(const fs::path& folder) { return folder / "logs"; }
 

@@ -31,6 +31,12 @@ inline bool has_begun(const State& state) {
   return state.progress == Progress::kStopped || state.progress == Progress::kRunning;
 }
 
+/// Returns when a checkpoint of a job was last written, as State has it; nothing without one.
+std::optional<std::int64_t> checkpoint_time_ns(const Job& job);
+/// Returns whether the next session of a job with this state continues what is there. If the job
+/// replaces results, a checkpoint counts only if a session of this batch has left it.
+bool continues(const State& before, const Job& job);
+
 /// Returns the folder of logs and states, FOLDER/logs.
 std::filesystem::path log_folder(const std::filesystem::path& folder);
 /// Returns the file of all that a job says, and the file of its state.

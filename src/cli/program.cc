@@ -1,5 +1,4 @@
 #include "cli/program.h"
-#include "base/system/child_process.h"
 
 #include <fmt/format.h>
 
@@ -16,6 +15,7 @@
 
 #include "base/log.h"
 #include "base/nearest_names.h"
+#include "base/system/child_process.h"
 #include "base/threads/parallel.h"
 #include "base/version.h"
 #include "cli/commands/commands.h"
@@ -157,6 +157,14 @@ void require_values(const std::vector<std::string>& arguments) {
       throw Error(fmt::format("{} has no value: give one, or leave the option out", word));
 }
 
+// Gives files behind "--" names that no option has: CLI11 takes a "--" after an option of several
+// values for the end of these alone.
+void name_files(std::vector<std::string>& arguments) {
+  const auto marker = std::ranges::find(arguments, "--");
+  for (auto word = marker; word != arguments.end(); ++word)
+    if (word != marker) *word = base::file_word(*word);
+}
+
 // Parses the command line and runs the command. Returns the exit status, or throws.
 int run_command(CLI::App& program, std::vector<std::string> arguments,
                 const distributed::Communicator& processes) {
@@ -167,6 +175,7 @@ int run_command(CLI::App& program, std::vector<std::string> arguments,
   processes.run_collectively([&] {
     require_known_command(program, arguments);
     require_shared_command(arguments, processes);
+    name_files(arguments);
     require_values(arguments);
     expand_config_file(program, arguments);
   });

@@ -34,6 +34,8 @@ evaluate::VolumePair pair_of(const Tomogram& first, const char* first_name, cons
         fmt::format("the {} has {} × {} × {} voxels and the {} {} × {} × {}: cut both to one size",
                     first_name, first.size[0], first.size[1], first.size[2], second_name,
                     second.size[0], second.size[1], second.size[2]));
+  evaluate::require_one_voxel_size(fmt::format("the {}", first_name), first.voxel_size_A,
+                                   fmt::format("the {}", second_name), second.voxel_size_A);
   return pair;
 }
 

@@ -74,7 +74,11 @@ TEST(PublicEvaluate, RefusesVolumesThatCannotBeCompared) {
   other.values[7] = std::nanf("");
   EXPECT_THROW(score_volume(volume, other), Error);
   other = noise(2);
+  other.voxel_size_A = 8.0;
+  EXPECT_THROW(score_volume(volume, other), Error);
+  EXPECT_THROW(correlate_shells(volume, other), Error);
   other.voxel_size_A = 0.0;
+  EXPECT_NO_THROW(score_volume(volume, other));
   EXPECT_THROW(correlate_shells(volume, other), Error);
 }
 

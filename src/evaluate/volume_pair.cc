@@ -22,10 +22,10 @@ void check_voxel_sizes(const io::MrcReader& first, const io::MrcReader& second) 
   const double a = io::cubic_voxel_size_A(first.header(), first.path()),
                b = io::cubic_voxel_size_A(second.header(), second.path());
   if (std::abs(a - b) <= 1e-4 * std::abs(b)) return;
-  if (voxel_sizes_differ(a, b, kMaxScaleDifference))
-    throw Error(fmt::format(
-        "'{}' has voxels of {:.4g} Å and '{}' of {:.4g} Å: bring them to one voxel size first",
-        first.path().string(), a, second.path().string(), b));
+  const auto quoted = [](const io::MrcReader& volume) {
+    return fmt::format("'{}'", volume.path().string());
+  };
+  require_one_voxel_size(quoted(first), a, quoted(second), b);
   base::log_warning(
       fmt::format("the voxel sizes differ ({:.6g} Å and {:.6g} Å): compared voxel by "
                   "voxel all the same",
@@ -115,6 +115,14 @@ void check_box(const base::Box& box, const base::Box& common, const io::MrcReade
 bool voxel_sizes_differ(double first_A, double second_A, double tolerance) {
   return io::is_known_size(first_A) && io::is_known_size(second_A) &&
          std::abs(first_A - second_A) > tolerance * second_A;
+}
+
+void require_one_voxel_size(const std::string& first, double first_A, const std::string& second,
+                            double second_A) {
+  if (voxel_sizes_differ(first_A, second_A, kMaxScaleDifference))
+    throw Error(fmt::format(
+        "{} has voxels of {:.4g} Å and {} of {:.4g} Å: bring them to one voxel size first", first,
+        first_A, second, second_A));
 }
 
 bool have_axes_in_another_order(const VolumeSizes& first, const VolumeSizes& second) {

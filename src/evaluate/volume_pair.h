@@ -16,6 +16,10 @@ using VolumeSizes = std::array<std::int64_t, 3>;
 /// Returns true if both voxel sizes (Å) are known and differ by more than `tolerance` times the
 /// second.
 bool voxel_sizes_differ(double first_A, double second_A, double tolerance);
+/// Throws Error, with the names of two volumes, if their voxel sizes (Å) are known and differ so
+/// much that their voxels cannot be compared one by one.
+void require_one_voxel_size(const std::string& first, double first_A, const std::string& second,
+                            double second_A);
 constexpr double kMaxScaleDifference = 0.05;  ///< for read_pair()
 
 /// Returns true if the axes of one of two volumes, which read_pair() would lay centre on centre,

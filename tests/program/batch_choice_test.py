@@ -180,6 +180,27 @@ def test_a_batch_that_goes_on_takes_the_stored_choice(data):
         assert ("--tv=3.5" in commands(folder)[name]) == (name != begun), name
 
 
+def test_a_batch_that_replaces_results_and_was_stopped_as_it_chose_chooses_again(data, once):
+    """The checkpoints of the results that are replaced are no series that have begun."""
+    folder = harness.fresh_directory("choice_replaced")
+    command = ["batch", *pattern(data), *OPEN, "-o", folder]
+    harness.succeed(*command)
+    run = harness.start(*command, "--overwrite", "--at-once", 1, "--threads", 1)
+    first_vote = os.path.join(folder, "logs", "choice", NAMES[1] + ".log")
+    os.remove(first_vote)
+    while run.poll() is None and not os.path.exists(first_vote):
+        time.sleep(0.01)
+    run.send_signal(signal.SIGTERM)
+    _, errors = run.communicate(timeout=60)
+    assert run.returncode == 143 and "stopped during the trials" in errors, errors
+    assert not os.path.exists(os.path.join(folder, "choice.json"))
+    assert "for all series: " in harness.succeed(*command, "--skip-existing").stderr
+    assert read(folder, "choice.json") == read(once, "choice.json")
+    for name in NAMES:
+        assert harness.read_bytes(os.path.join(folder, name + ".mrc")) == \
+            harness.read_bytes(os.path.join(once, name + ".mrc"))
+
+
 def test_the_one_series_that_is_left_without_a_choice_is_named(data, each):
     """Without choice.json there is nobody to share a new choice with."""
     folder = harness.fresh_directory("choice_left")

@@ -368,6 +368,15 @@ def test_own_options_may_have_several_values(series):
         os.path.join(folder, "wbp.mrc"))
 
 
+def test_a_series_that_is_called_like_an_option_is_compared(series):
+    folder = harness.fresh_directory("dashes")
+    shutil.copy(series.tlt, os.path.join(folder, "x.tlt"))
+    for name in ("-x.mrc", "--overwrite"):
+        shutil.copy(series.stack, os.path.join(folder, name))
+        harness.succeed("compare", "--tlt", "x.tlt", *QUICK, "-o", f"of{name}", "--methods", "wbp",
+                        "--", name, cwd=folder)
+
+
 def test_no_volume_of_another_size_is_compared(compare):
     folder = harness.fresh_directory("sizes")
     compare(folder)

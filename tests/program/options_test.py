@@ -4,6 +4,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 
 import pytest
 
@@ -124,6 +125,17 @@ def test_a_file_says_what_the_command_line_says():
     assert options_of(configured) == options_of(written)
     assert options_of(configured)["specimen"]["axis_z"] == 11
     assert harness.read_bytes(configured.volume_path) == harness.read_bytes(written.volume_path)
+
+
+def test_what_follows_two_dashes_is_a_file():
+    series = harness.Series("dashed")
+    folder = harness.fresh_directory("dashes")
+    pathlib.Path(folder, "bright.toml").write_text("thickness = 24\ncontrast = 'bright'\n", encoding="utf-8")
+    shutil.copy(series.tlt, os.path.join(folder, "x.tlt"))
+    for name in ("-x.mrc", "--config=x.mrc", "--overwrite"):
+        shutil.copy(series.stack, os.path.join(folder, name))
+        harness.succeed("baseline", "wbp", "--config", "bright.toml", "--tlt", "x.tlt", "-o", f"of{name}.mrc",
+                        "--", name, cwd=folder)
 
 
 def test_recorded_options_repeat_the_run():

@@ -151,8 +151,11 @@ def test_runs_that_end_early_write_theirs(series):
     run, errors = harness.stop_after_first_step(
         ["reconstruct", *series.input, *harness.merge(harness.QUICK, ["--epochs", 100000]), "-o",
          os.path.join(directory, "out.mrc"), "--trace", path])
-    assert run.returncode == 143, errors
+    assert run.returncode == 143 and "--resume, and another name for --trace" in errors, errors
     assert of_kind(read_trace(path), "span")
+    refused = harness.tomofield("reconstruct", *series.input, *harness.QUICK, "-o",
+                                os.path.join(directory, "out.mrc"), "--resume", "--trace", path)
+    assert refused.returncode == 2 and "give another name with --trace\n" in refused.stderr, refused
     path = os.path.join(directory, "failed.json")
     wrong = os.path.join(directory, "wrong.tlt")
     pathlib.Path(wrong).write_text("1\n2\n")

@@ -131,6 +131,7 @@ class Holder:
 SENTENCES = (
     ("the number of threads must be from 1 to 1024", lambda m: tomofield.set_thread_count(-1)),
     ("or 0 for the default, not 1000000", lambda m: tomofield.set_thread_count(10**6)),
+    ("or 0 for the default, not 2147483648", lambda m: tomofield.set_thread_count(2**31)),
     ("too little memory", lambda m: tomofield.score_volume(  # of 2 EiB, which no machine has
         *2 * [np.broadcast_to(np.float64(1), (1 << 20, 1 << 20, 1 << 19))])),
     ("too little memory", lambda m: tomofield.score_volume(  # of more bytes than have a number

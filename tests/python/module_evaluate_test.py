@@ -36,6 +36,16 @@ def test_shells_correlate(series):
     assert 20 < noisy.resolution_A(threshold=0.5) < 320
 
 
+def test_volumes_of_different_voxel_sizes_are_refused(series):
+    fine, coarse = (tomofield.Tomogram(series.truth, size) for size in (10.0, 20.0))
+    for function in (tomofield.score_volume, tomofield.correlate_shells):
+        with pytest.raises(tomofield.Error, match="10 Å .* of 20 Å: bring them to one voxel size"):
+            function(fine, coarse)
+    assert tomofield.score_volume(fine, series.truth).correlation == pytest.approx(1)
+    curve = tomofield.correlate_shells(fine, coarse, voxel_size_A=5.0)  # as the caller knows better
+    assert curve.frequency_per_A[-1] == pytest.approx(1 / 10)
+
+
 def test_bad_input_is_refused_in_a_sentence(series):
     with pytest.raises(tomofield.Error, match="cut both to one size"):
         tomofield.score_volume(series.tomogram[1:], series.truth)

@@ -392,7 +392,7 @@ builtins.last = Last()
     for _ in range(3):
         ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
                                env={**os.environ, "PYTHONPATH": module}, timeout=60, check=False)
-        assert ended.returncode == 0, (ended.returncode, ended.stderr)
+        assert ended.returncode == 0 and not ended.stderr, (ended.returncode, ended.stderr)
 
 
 @pytest.mark.parametrize("work, said", (

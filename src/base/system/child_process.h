@@ -13,6 +13,12 @@
 
 namespace tomofield::base {
 
+/// Returns the word that names a file in a command of this program: a file called "-x.mrc" would be
+/// an option.
+inline std::string file_word(const std::string& file) {
+  return file.starts_with('-') ? "./" + file : file;
+}
+
 /// The time and the memory that a program took.
 struct Costs {
   double core_seconds = 0, wall_seconds = 0;

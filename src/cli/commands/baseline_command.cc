@@ -104,7 +104,7 @@ void run(const CLI::App& command, BaselineArguments& arguments) {
   const output::OutputPaths paths = output::output_paths(files.output);
   const auto check_files_beside = [&] {
     check_extra_files({{arguments.trace, "--trace"}, {arguments.dry_run.grid, "--grid"}},
-                      {paths.volume, paths.json}, options.files, files.overwrite);
+                      {paths.volume, paths.json}, options.files, files);
   };
   if (arguments.dry_run.is_wanted) {
     baseline::check_options(options);

@@ -52,13 +52,13 @@ void run(const CLI::App& command, ReconstructArguments& arguments,
                        {arguments.choice, "--choice"},
                        {arguments.trace, "--trace"},
                        {arguments.dry_run.grid, "--grid"}},
-                      reconstruction::result_files(options), options.files, options.run.overwrite);
+                      reconstruction::result_files(options), options.files, options.run);
   });
   if (arguments.plan) return write_plan(*arguments.plan, options, processes);
   run_traced(arguments.dry_run.is_wanted ? std::nullopt : arguments.trace, processes, [&] {
     if (arguments.choice && !arguments.dry_run.is_wanted)
       return write_choice(*arguments.choice, options, processes);
-    run_reconstruction(options, arguments.dry_run, processes);
+    run_reconstruction(options, arguments.dry_run, arguments.trace.has_value(), processes);
   });
 }
 

@@ -110,24 +110,26 @@ void print_files(const options::ReconstructOptions& options, const output::Outpu
 }
 
 ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
-                   const options::ReconstructOptions& options) {
-  return {
-      stop_status(),
-      fmt::format("stopped; {} '{}': continue with the same command and --resume{}", what_is_there,
-                  file.string(), options.run.overwrite ? " instead of --overwrite" : "")};
+                   const options::ReconstructOptions& options, bool leaves_trace) {
+  return {stop_status(),
+          fmt::format("stopped; {} '{}': continue with the same command and --resume{}{}",
+                      what_is_there, file.string(),
+                      options.run.overwrite ? " instead of --overwrite" : "",
+                      leaves_trace ? ", and another name for --trace" : "")};
 }
 
 // Throws the ExitStatus of a run that was stopped.
 void require_finished(const reconstruction::RunResult& run,
-                      const options::ReconstructOptions& options,
-                      const output::OutputPaths& paths) {
+                      const options::ReconstructOptions& options, const output::OutputPaths& paths,
+                      bool leaves_trace) {
   switch (run.outcome) {
     case reconstruction::Outcome::kFinished:
       return;
     case reconstruction::Outcome::kStopped:
-      throw stopped("the checkpoint is", run.checkpoint, options);
+      throw stopped("the checkpoint is", run.checkpoint, options, leaves_trace);
     case reconstruction::Outcome::kStoppedTuning:
-      if (options.fit.tune) throw stopped("the finished trials are in", paths.trials, options);
+      if (options.fit.tune)
+        throw stopped("the finished trials are in", paths.trials, options, leaves_trace);
       throw ExitStatus{stop_status(), "stopped before the first checkpoint"};
     case reconstruction::Outcome::kStoppedAligning:
       throw_stopped_alignment();
@@ -193,7 +195,7 @@ void print_alignment(const options::ReconstructOptions& options) {
 }
 
 void run_reconstruction(const options::ReconstructOptions& options, const DryRun& dry_run,
-                        const distributed::Communicator& processes) {
+                        bool leaves_trace, const distributed::Communicator& processes) {
   if (options.run.output.empty()) throw Error("-o '' names no file: name the tomogram");
   const auto show_plan = [&](const plan::RunPlan& plan) {
     warn_of_unused_rank(options);
@@ -214,7 +216,7 @@ void run_reconstruction(const options::ReconstructOptions& options, const DryRun
   reconstruction::Observer observer = terminal_observer(processes);
   observer.planned = show_plan;
   const reconstruction::RunResult run = reconstruction::run(options, observer, processes);
-  require_finished(run, options, paths);
+  require_finished(run, options, paths, leaves_trace);
   if (processes.is_root()) print_results(run, options, paths);
 }
 

@@ -35,9 +35,10 @@ void print_pictures(const std::vector<std::filesystem::path>& pictures);
 
 /// Makes a reconstruction (reconstruction::run()): prints its plan, its progress and its files. A
 /// dry run prints the plan alone. If a signal stops it, it throws an ExitStatus that says how to
-/// continue. Every process that shares the run calls it; the root prints.
+/// continue: under another name for the trace if it leaves one (trace_option.h). Every process that
+/// shares the run calls it; the root prints.
 void run_reconstruction(
-    const options::ReconstructOptions& options, const DryRun& dry_run,
+    const options::ReconstructOptions& options, const DryRun& dry_run, bool leaves_trace,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
 }  // namespace tomofield::cli

@@ -48,12 +48,12 @@ void run(const CLI::App& command, TensorfArguments& arguments) {
   options::ReconstructOptions options = options::run_options(arguments.choices.files, requested);
   const output::OutputPaths paths = output::output_paths(options.run.output);
   check_extra_files({{arguments.trace, "--trace"}, {arguments.dry_run.grid, "--grid"}},
-                    {paths.volume, paths.model, paths.json}, options.files, options.run.overwrite);
+                    {paths.volume, paths.model, paths.json}, options.files, options.run);
   base::require_no_faults(options.faults());
   options.field.leaf_size = size_of_node(options);
   run_traced(arguments.dry_run.is_wanted ? std::nullopt : arguments.trace,
              distributed::Communicator::alone(),
-             [&] { run_reconstruction(options, arguments.dry_run); });
+             [&] { run_reconstruction(options, arguments.dry_run, arguments.trace.has_value()); });
 }
 
 }  // namespace

@@ -55,7 +55,7 @@ struct ExtraFile {
 /// replaced.
 void check_extra_files(std::initializer_list<ExtraFile> files,
                        const std::vector<std::filesystem::path>& results, const SeriesFiles& input,
-                       bool may_replace);
+                       const RunOptions& run);
 
 /// Returns the subcommand that the leading words of the arguments name.
 const CLI::App* find_command(const CLI::App& program, const std::vector<std::string>& arguments);

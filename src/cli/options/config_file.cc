@@ -21,11 +21,16 @@ namespace {
 
 constexpr const char* kConfigFlag = "--config";
 
+// Returns the end of the options among the words of a command line: behind "--" all are files.
+auto end_of_options(std::vector<std::string>& arguments) {
+  return std::ranges::find(arguments, "--");
+}
+
 // Removes `--config FILE` or `--config=FILE` from the arguments. Returns FILE, or nothing.
 std::optional<std::string> take_config_path(std::vector<std::string>& arguments) {
   std::optional<std::string> path;
   const std::string assignment = std::string(kConfigFlag) + "=";
-  for (auto it = arguments.begin(); it != arguments.end();) {
+  for (auto it = arguments.begin(); it != end_of_options(arguments);) {
     const bool is_assignment = it->rfind(assignment, 0) == 0;
     if (*it != kConfigFlag && !is_assignment) {
       ++it;
@@ -33,7 +38,8 @@ std::optional<std::string> take_config_path(std::vector<std::string>& arguments)
     }
     if (path) throw Error("--config is given twice: put the options into one file");
     const auto end = it + (is_assignment ? 1 : 2);
-    if (!is_assignment && it + 1 == arguments.end()) throw Error("--config needs a file name");
+    if (!is_assignment && it + 1 == end_of_options(arguments))
+      throw Error("--config needs a file name");
     path = is_assignment ? it->substr(assignment.size()) : *(it + 1);
     it = arguments.erase(it, end);
   }
@@ -145,7 +151,7 @@ void expand_config_file(const CLI::App& program, std::vector<std::string>& argum
   if (!path) return;
   io::add_input(*path);
   const CLI::App* command = find_command(program, arguments);
-  const std::vector<std::string> given = arguments;
+  const std::vector<std::string> given(arguments.begin(), end_of_options(arguments));
   for (const auto& [key, node] : read_toml(*path)) {
     const Entry entry(*path, decoded(std::string(key.str())), node);
     const CLI::Option* option = command->get_option_no_throw("--" + entry.name());
@@ -155,8 +161,8 @@ void expand_config_file(const CLI::App& program, std::vector<std::string>& argum
                              help_flag_of(*command)));
     }
     if (is_given(*option, given)) continue;
-    for (std::string& word : entry.arguments(option->get_items_expected_max()))
-      arguments.push_back(std::move(word));
+    const std::vector<std::string> words = entry.arguments(option->get_items_expected_max());
+    arguments.insert(end_of_options(arguments), words.begin(), words.end());
   }
 }
 
