@@ -19,6 +19,8 @@
 #include "batch/slurm.h"
 #include "batch/state_record.h"
 #include "io/saving/output_folder.h"
+#include "io/saving/output_lock.h"
+#include "tomofield/error.h"
 
 namespace tomofield::batch {
 namespace {
@@ -106,6 +108,7 @@ class Planner {
             .command = command_of(series, options_.common),
             .needs = {},
             .files = {.inputs = {series.input}, .results = {}, .relion_tomogram = {}}};
+    if (!is_free(series)) return job;
     job.replaces =
         options_.overwrites || to_replace_.contains(fs::absolute(job.output).lexically_normal());
     job.is_skipped = options_.skips_existing && !job.replaces && has_results(job.output);
@@ -124,6 +127,17 @@ class Planner {
   }
 
  private:
+  // A run of a batch that was killed a moment ago may still end in order.
+  bool is_free(const Series& series) {
+    try {
+      io::require_unlocked(series.output);
+    } catch (const Error& error) {
+      faults_.add(fmt::format("{}: {}", series.source, error.what()));
+      return false;
+    }
+    return true;
+  }
+
   void check_results(const Series& series, Job& job) {
     job.files.relion_tomogram = tomogram_of_result(job);
     if (series.is_tomogram && job.files.relion_tomogram.empty()) without_row_.push_back(job.name);

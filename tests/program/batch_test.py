@@ -1,6 +1,7 @@
 """Tests batch: the list of series, what runs, how it goes on, and the summary that it writes."""
 
 import csv
+import fcntl
 import json
 import os
 import pathlib
@@ -781,6 +782,17 @@ def test_a_batch_that_is_stopped_goes_on(data, number):
     again.send_signal(signal.SIGTERM)
     again.communicate(timeout=60)
     assert "resum" in harness.read_bytes(log).decode()
+
+
+def test_a_series_that_another_run_writes_is_waited_for(data):
+    """The runs of a batch that was killed may still end in order, and their files are no faults."""
+    folder = harness.fresh_directory("still_running")
+    pathlib.Path(folder, "a.h5").write_bytes(b"half written")
+    with open(os.path.join(folder, ".a.mrc.tomofield-lock"), "w", encoding="ascii") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        said = harness.tomofield("batch", *pattern(data), *QUICK, "--skip-existing", "-o", folder)
+    assert said.returncode == 2 and "another run writes" in said.stderr, said
+    assert "wait until it has ended" in said.stderr and "remove" not in said.stderr, said
 
 
 def test_a_series_that_is_killed_ends_alone(data):

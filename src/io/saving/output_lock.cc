@@ -189,6 +189,17 @@ bool has_lock_file(const fs::path& path) {
   return fs::exists(lock_file_of(output_target(path)), failed);
 }
 
+void require_unlocked(const fs::path& path) {
+  const fs::path target = output_target(path);
+  const int descriptor =
+      ::open(lock_file_of(target).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+  if (descriptor < 0) return;
+  const bool is_held = ::flock(descriptor, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  const std::string holder = holder_of(descriptor);
+  ::close(descriptor);
+  if (is_held) throw_held(target, holder);
+}
+
 std::vector<OutputLock> claim_outputs(const std::vector<fs::path>& paths,
                                       const std::function<void()>& check) {
   check();

@@ -34,6 +34,10 @@ class OutputLock {
 /// Says whether there is a lock file of `path`: a process writes it, or was killed while it did.
 bool has_lock_file(const std::filesystem::path& path);
 
+/// Throws Error, as OutputLock does, if another process has the lock of `path`. Locks nothing and
+/// makes no file.
+void require_unlocked(const std::filesystem::path& path);
+
 /// Locks the results of a run after `check`, which throws Error if they must not be written. Calls
 /// `check` once more behind the locks, because another run may have made the files meanwhile.
 std::vector<OutputLock> claim_outputs(const std::vector<std::filesystem::path>& paths,

@@ -65,6 +65,7 @@ TEST(OutputLock, TellsWhoWritesTheFile) {
        {(scratch / "result.txt").string(), std::string(host),
         fmt::format("process {}", other.process()), std::string("since 2")})
     EXPECT_NE(message.find(fact), std::string::npos) << message;
+  EXPECT_EQ(message_of<Error>([&] { require_unlocked(scratch / "result.txt"); }), message);
   EXPECT_THROW(AtomicFile(scratch / "./result.txt"), Error);
   EXPECT_NO_THROW(OutputLock(scratch / "other.txt"));
 }
@@ -78,6 +79,8 @@ TEST(OutputLock, ProtectsTheTemporaryFilesOfItsHolder) {
   EXPECT_THROW(OutputLock(scratch / "result.txt"), Error);
   EXPECT_EQ(scratch.num_files(), num_files);
   other.kill();
+  EXPECT_NO_THROW(require_unlocked(scratch / "result.txt"));
+  EXPECT_EQ(scratch.num_files(), num_files);
   { const OutputLock lock(scratch / "result.txt"); }
   EXPECT_EQ(scratch.num_files(), 0u) << "what a killed process left is gone";
 }
