@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <map>
 
 #include "batch/slurm.h"
@@ -81,12 +80,24 @@ std::vector<std::string> settings_words(const SharedSettings& settings, const Ne
   return words;
 }
 
+std::string_view flag_of(std::string_view word) { return word.substr(0, word.find('=')); }
+
+bool has_flag_of(const std::vector<std::string>& command, std::string_view word) {
+  return std::ranges::find(command, flag_of(word), flag_of) != command.end();
+}
+
 // Returns the words of a command that give settings which the series of a batch share.
 std::vector<std::string> shared_words(const std::vector<std::string>& command) {
   std::vector<std::string> words;
-  std::ranges::copy_if(command, std::back_inserter(words), [](const std::string& word) {
-    return is_shared(std::string_view(word).substr(0, word.find('=')));
-  });
+  for (const std::string& word : command)  // an earlier version may have left one twice
+    if (is_shared(flag_of(word)) && !has_flag_of(words, word)) words.push_back(word);
+  return words;
+}
+
+// Returns the words whose flags a command does not have: it states the others itself.
+std::vector<std::string> without_those_of(const std::vector<std::string>& command,
+                                          std::vector<std::string> words) {
+  std::erase_if(words, [&](const std::string& word) { return has_flag_of(command, word); });
   return words;
 }
 
@@ -115,9 +126,9 @@ std::vector<std::size_t> keep_begun_settings(const fs::path& folder,
     if (!continues(read_state(folder, job), job)) continue;  // the checkpoint is to be replaced
     if (entry == begun.end() && stored) continue;
     if (entry != begun.end()) {
-      if (stored && entry->second != settings_words(stored->settings, job.needs))
-        differing.push_back(i);
-      give_words(entry->second, folder, job);
+      const auto words = without_those_of(job.command, entry->second);
+      if (stored && words != settings_words(stored->settings, job.needs)) differing.push_back(i);
+      give_words(words, folder, job);
     }
     job.needs.open_variation = job.needs.open_spike_rank = job.needs.open_prior = false;
   }

@@ -162,6 +162,13 @@ TEST(PlanChoice, LetsSeriesThatHaveBegunGoOnWithTheirSettings) {
   EXPECT_EQ(plan.differing, std::vector<std::size_t>{0});
   write_choice(directory.path(), *count_votes({vote(Penalty::kSmooth, 4.5)}));
   EXPECT_TRUE(planned().first.differing.empty());
+  jobs[0].command.push_back("--spike-rank=3");  // as an earlier version left it
+  write_jobs(list_of(directory.path()), {.jobs = jobs, .overwrites = false});
+  std::vector<Job> stating = open_jobs(1, directory.path());
+  stating[0].command = {"--spike-rank=3"};
+  stating[0].needs.open_spike_rank = false;
+  EXPECT_TRUE(plan_choice(directory.path(), true, stating).differing.empty());
+  EXPECT_EQ(stating[0].command, (Words{"--spike-rank=3", "--tv-penalty=smooth", "--tv=4.5", file}));
   forget_choice(directory.path());
   next = planned().second;
   EXPECT_EQ(next[0].command, smooth);

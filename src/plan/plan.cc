@@ -175,9 +175,8 @@ RunPlan require_possible_run(const tilt_series::PlannedSeries& series,
   return plan;
 }
 
-void check_before_alignment(const options::ReconstructOptions& options,
-                            const distributed::Communicator& processes) {
-  if (options.run.align == Alignment::kOff) return;
+void check_before_reading(const options::ReconstructOptions& options,
+                          const distributed::Communicator& processes) {
   const tilt_series::PlannedSeries series(options.input(), processes);
   processes.run_collectively([&] {
     const RunPlan plan = require_possible_run(series, options, processes);

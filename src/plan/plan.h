@@ -48,10 +48,9 @@ RunPlan require_possible_run(
     const tilt_series::PlannedSeries& series, const options::ReconstructOptions& options,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
-/// Checks a run with --align before its views are aligned, which takes long: throws Error as
-/// require_possible_run() does. Reads no view. Does nothing for a run without --align. Every
-/// process calls it.
-void check_before_alignment(
+/// Checks a run before its views are read and aligned, which takes long: throws Error as
+/// require_possible_run() does. Reads no view. Every process calls it.
+void check_before_reading(
     const options::ReconstructOptions& options,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 

@@ -147,7 +147,7 @@ TEST_F(Plan, RefusesWhatTheMachineCannotHold) {
 TEST_F(Plan, RefusesTooFewViewsForAnAlignmentBeforeIt) {
   options_.run.align = Alignment::kRefine;
   plan();
-  check_before_alignment(options_);
+  check_before_reading(options_);
   check_alignment_alone(options_);
   options_.views.exclude = "1-4";
   const auto refusal = [](const auto& check) {
@@ -156,14 +156,13 @@ TEST_F(Plan, RefusesTooFewViewsForAnAlignmentBeforeIt) {
     EXPECT_NE(message.find("11"), std::string::npos) << message;
   };
   refusal([&] { plan(); });
-  refusal([&] { check_before_alignment(options_); });
+  refusal([&] { check_before_reading(options_); });
   refusal([&] { check_alignment_alone(options_); });
   options_.alignment.emplace();  // it may have left views out
   plan();
 }
 
-TEST_F(Plan, RefusesTooMuchMemoryBeforeAnAlignment) {
-  options_.run.align = Alignment::kRefine;
+TEST_F(Plan, RefusesTooMuchMemoryBeforeAnyViewIsRead) {
   options_.files.stack =
       testing::write_stack(scratch_ / "wide.mrc", 512, 512, kNumViews, testing::some_value, 2.5);
   options_.specimen.thickness = 1e6;
@@ -171,7 +170,7 @@ TEST_F(Plan, RefusesTooMuchMemoryBeforeAnAlignment) {
     const std::string message = testing::message_of<Error>(check);
     EXPECT_NE(message.find("GiB"), std::string::npos) << message;
   };
-  refusal([&] { check_before_alignment(options_); });
+  refusal([&] { check_before_reading(options_); });
   refusal([&] { check_alignment_alone(options_); });
 }
 
@@ -181,7 +180,7 @@ TEST_F(Plan, BeforeAnAlignmentIsSilent) {
                                               testing::some_value, 1.0);
   int num_messages = 0;
   base::set_log_sink([&](base::LogLevel, std::string_view) { ++num_messages; });
-  check_before_alignment(options_);
+  check_before_reading(options_);
   EXPECT_EQ(num_messages, 0);
   base::log_info("the pause is over");
   EXPECT_EQ(num_messages, 1);

@@ -260,7 +260,7 @@ RunResult fit_all_views(const Run& run, const plan::TilePlan& tiles,
 RunResult run(options::ReconstructOptions options, const Observer& observer,
               const distributed::Communicator& processes) {
   const std::vector<io::OutputLock> locks = claim(options, processes);
-  plan::check_before_alignment(options, processes);
+  plan::check_before_reading(options, processes);
   if (!align_views(options, observer, processes)) return {.outcome = Outcome::kStoppedAligning};
   const tilt_series::TiltSeries series(options.input(), processes);
   const plan::RunPlan plan = make_plan(series, options, observer, processes);
@@ -290,7 +290,7 @@ Preview preview(const options::ReconstructOptions& options,
 bool choose(const std::filesystem::path& file, options::ReconstructOptions options,
             const Observer& observer, const distributed::Communicator& processes) {
   const std::vector<io::OutputLock> locks = claim(options, processes);
-  plan::check_before_alignment(options, processes);
+  plan::check_before_reading(options, processes);
   if (!align_views(options, observer, processes)) return false;
   const tilt_series::TiltSeries series(options.input(), processes);
   make_plan(series, options, observer, processes);

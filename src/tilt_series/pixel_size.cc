@@ -136,12 +136,16 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& s
   return 1.0;
 }
 
-void warn_of_headers(const TiltSeriesOptions& options, const io::ImageStack& stack) {
+void warn_of_headers(const TiltSeriesOptions& options, const io::ImageStack& stack,
+                     const std::optional<io::Mdoc>& mdoc) {
   const io::MrcHeader& header = stack.header();
   if (!header.extended_difference.empty())
     base::log_warning(
-        fmt::format("the extended header of '{}' states {}: that of the first section is taken",
+        fmt::format("the header of '{}' states {}: that of the first section is taken",
                     stack.name(), header.extended_difference));
+  if (mdoc)
+    for (const std::string& difference : mdoc->differences)
+      base::log_warning(fmt::format("'{}' states {}", options.mdoc->string(), difference));
   if (!options.pixel_size_A)
     return warn_of_other_size(fmt::format("the extended header of '{}'", stack.name()),
                               header.extended_pixel_A.value_or(0.0), /*knows_binning=*/false,

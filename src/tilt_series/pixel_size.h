@@ -17,7 +17,8 @@ std::optional<io::MrcFacts> facts_of(const TiltSeriesOptions& options, const io:
 double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& stack,
                        const std::optional<io::Mdoc>& mdoc);
 
-/// Warns of what the header of a stack states twice, and differently.
-void warn_of_headers(const TiltSeriesOptions& options, const io::ImageStack& stack);
+/// Warns of what the header of a stack, or its .mdoc, states twice, and differently.
+void warn_of_headers(const TiltSeriesOptions& options, const io::ImageStack& stack,
+                     const std::optional<io::Mdoc>& mdoc);
 
 }  // namespace tomofield::tilt_series

@@ -342,7 +342,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
       warn_of_given_axis(*options.tilt_axis_deg, axis_of_files(options, stack, table, mdoc));
     if (options.starts_raw && !axis && !alignment) warn_of_unknown_axis(stack);
     warn_of_sections_beyond(options, stack);
-    warn_of_headers(options, stack);
+    warn_of_headers(options, stack, mdoc);
     warn_of_mode(stack);
   }
 

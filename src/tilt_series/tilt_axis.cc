@@ -26,13 +26,14 @@ bool is_transformed(const io::MrcHeader& header) {
                              [&](std::string_view word) { return io::is_in_labels(header, word); });
 }
 
-std::optional<double> axis_of_labels(const io::MrcHeader& header) {
-  for (const std::string& label : header.labels) {
-    const auto word = io::axis_of_title(label);
-    const auto axis_deg = word ? io::parse_number(*word, base::kLargestAngle_deg) : std::nullopt;
-    if (axis_deg) return axis_deg;
-  }
-  return std::nullopt;
+// Throws Error if titles among the labels state several tilt axes.
+void require_one_title(const io::ImageStack& stack) {
+  const std::vector<double> axes_deg = io::axes_of_labels(stack.header().labels);
+  if (axes_deg.size() < 2 || is_transformed(stack.header())) return;
+  throw Error(
+      fmt::format("the labels of '{}' state a tilt axis of {:.6g}° and one of {:.6g}°: give the "
+                  "right one with --tilt-axis",
+                  stack.name(), axes_deg[0], axes_deg[1]));
 }
 
 std::string line_of(const std::filesystem::path& path, const io::AxisAngle& axis) {
@@ -71,8 +72,8 @@ double angle_between_axes(double a_deg, double b_deg) {
 std::optional<StatedAxis> axis_of_header(const io::ImageStack& stack) {
   const io::MrcHeader& header = stack.header();
   if (is_transformed(header)) return std::nullopt;
-  auto axis_deg = axis_of_labels(header);
-  if (!axis_deg) axis_deg = header.extended_axis_deg;
+  const std::vector<double> titles_deg = io::axes_of_labels(header.labels);
+  const auto axis_deg = titles_deg.empty() ? header.extended_axis_deg : titles_deg.front();
   if (!axis_deg) return std::nullopt;
   return StatedAxis{*axis_deg, fmt::format("the header of '{}'", stack.name())};
 }
@@ -85,7 +86,10 @@ std::optional<StatedAxis> find_stated_axis(const TiltSeriesOptions& options,
     return std::nullopt;
   std::optional<StatedAxis> axis;
   if (mdoc) axis = axis_of_mdoc(*options.mdoc, *mdoc, is_aligned);
-  if (!axis) axis = axis_of_header(stack);
+  if (!axis) {
+    if (!is_aligned) require_one_title(stack);
+    axis = axis_of_header(stack);
+  }
   if (!axis && mdoc && mdoc->lone_rotation_deg && !is_aligned && !is_transformed(stack.header()))
     refuse_lone_rotation(*options.mdoc, *mdoc->lone_rotation_deg);
   if (axis) axis->angle_deg = std::remainder(axis->angle_deg, 360.0);

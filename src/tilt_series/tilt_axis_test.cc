@@ -63,6 +63,13 @@ TEST(TiltAxis, OfTheHeadersTitleIsThatOfARawStack) {
   EXPECT_EQ(refusal(options), "");
   write_labels(options, {"Tilt axis angle = 0.4, binning = 1"});
   EXPECT_EQ(refusal(options), "");
+  write_labels(options, {title, "Tilt axis angle = 85, binning = 1"});
+  options.starts_raw = true;
+  EXPECT_NEAR(axis_of(options), 85.3, 1e-9);
+  write_labels(options, {title, "Tilt axis angle = 12, binning = 1"});
+  expect_parts(refusal(options), {"a.st", "85.3°", "12°", "--tilt-axis"});
+  options.tilt_axis_deg = 12;
+  EXPECT_EQ(refusal(options), "");
 }
 
 TEST(TiltAxis, ThatIsGivenTurnsTheViews) {
@@ -185,6 +192,19 @@ TEST(TiltAngles, AllSectionsThatCannotBeAreNamedAtOnce) {
   expect_parts(refusal(options), {"b.tlt", "all 5 sections", "3°"});
   options.exclude = "2-5";
   EXPECT_EQ(refusal(options), "");  // one view alone
+}
+
+TEST(TiltAxis, OfAnMdocThatStatesTwoIsSaid) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  options.starts_raw = true;
+  options.mdoc = scratch.write("a.mdoc",
+                               "[T = Tilt axis angle = 85.3, binning = 1]\nTiltAxisAngle = 12\n"
+                               "[ZValue = 0]\nTiltAngle = -20\n[ZValue = 1]\nTiltAngle = -10\n"
+                               "[ZValue = 2]\nTiltAngle = 0\n");
+  const WarningCatcher warnings;
+  EXPECT_NEAR(axis_of(options), 85.3, 1e-9);
+  expect_parts(warnings.text(), {"a.mdoc", "85.3° in line 1", "12° in line 2"});
 }
 
 TEST(PixelSize, OfAnMdocIsThatOfItsOwnImages) {

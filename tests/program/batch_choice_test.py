@@ -201,6 +201,22 @@ def test_a_batch_that_replaces_results_and_was_stopped_as_it_chose_chooses_again
             harness.read_bytes(os.path.join(once, name + ".mrc"))
 
 
+@pytest.mark.parametrize("stated", (["--spike-rank", 3], ["--prior", "tv"]))
+def test_series_that_state_a_part_of_the_choice_go_on(data, stated):
+    folder = harness.fresh_directory("choice_partly_stated")
+    command = ["batch", *pattern(data), *harness.merge(OPEN, ["--epochs", 100]), *stated, "--checkpoint-minutes", 0,
+               "--at-once", 1, "-o", folder]
+    run = harness.start(*command)
+    while run.poll() is None and not any(name.endswith(".h5") for name in os.listdir(folder)):
+        time.sleep(0.02)
+    run.send_signal(signal.SIGINT)
+    _, errors = run.communicate(timeout=60)
+    assert run.returncode == 130, errors
+    before = commands(folder)
+    harness.succeed(*command, "--skip-existing")
+    assert commands(folder) == before
+
+
 def test_the_one_series_that_is_left_without_a_choice_is_named(data, each):
     """Without choice.json there is nobody to share a new choice with."""
     folder = harness.fresh_directory("choice_left")

@@ -104,12 +104,11 @@ std::optional<double> series_pixel_A(const fs::path& path, const io::StarTable& 
   return std::nullopt;
 }
 
-/// Returns three angles of a row, or nothing without their columns.
-std::optional<Point> angles_of(const io::StarRow& row, const std::array<const char*, 3>& columns) {
-  const auto rot = row.find_number(columns[0]), tilt = row.find_number(columns[1]),
-             psi = row.find_number(columns[2]);
-  if (!rot || !tilt || !psi) return std::nullopt;
-  return Point{*rot, *tilt, *psi};
+/// Returns the rotation that three angles of a row state. As in RELION, one that is not stated is
+/// 0.
+field::Rotation rotation_of(const io::StarRow& row, const std::array<const char*, 3>& columns) {
+  const auto angle = [&](const char* column) { return row.find_number(column).value_or(0.0); };
+  return field::rotation_from_euler(angle(columns[0]), angle(columns[1]), angle(columns[2]));
 }
 
 /// Returns a particle whose coordinates count from `centre`, a point of the volume.
@@ -120,8 +119,7 @@ Particle relion_particle(const io::StarRow& row, const Point& centre, double pix
   for (std::size_t a = 0; a < 3; ++a)
     particle.place_px[a] +=
         (row.number(kCoordinates[a], kLargest_A) + kCentre_px * unbinned_A) / pixel_A;
-  if (const auto angles = angles_of(row, kSubtomogramAngles))
-    particle.volume_from_box = field::rotation_from_euler((*angles)[0], (*angles)[1], (*angles)[2]);
+  particle.volume_from_box = rotation_of(row, kSubtomogramAngles);
   return particle;
 }
 

@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "io/images/image_stack.h"
+#include "io/tables/alignment_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -60,6 +61,7 @@ class FilesStack : public ImageStack {
       throw Error(fmt::format("{} asks for image {} of '{}', which has {}", name_,
                               *image.section + 1, file, found.nz));
     }
+    note_difference(found, file);
     constexpr double kSamePixel = 1e-3;
     const auto& [width_A, height_A, depth_A] = header_.voxel_size_A;
     if (found.nx != header_.nx || found.ny != header_.ny ||
@@ -71,6 +73,21 @@ class FilesStack : public ImageStack {
                       file, found.nx, found.ny, found.voxel_size_A[0], found.voxel_size_A[1], name_,
                       header_.nx, header_.ny, width_A, height_A));
     }
+  }
+
+  // Notes if an image states another tilt axis or voltage than the first one.
+  void note_difference(const MrcHeader& found, const std::string& file) {
+    const auto axis = [](const MrcHeader& header) {
+      const std::vector<double> titles = axes_of_labels(header.labels);
+      return titles.empty() ? header.extended_axis_deg : std::optional(titles.front());
+    };
+    const auto note = [&](const char* what, const auto& here, const auto& first) {
+      if (here && first && are_two_axes(*here, *first) && header_.extended_difference.empty())
+        header_.extended_difference = fmt::format(
+            "{} of {:.6g} in '{}', and of {:.6g} in the first image", what, *here, file, *first);
+    };
+    note("a tilt axis in degrees", axis(found), axis(header_));
+    note("a voltage in kV", found.extended_voltage_kV, header_.extended_voltage_kV);
   }
 
   std::string name_;

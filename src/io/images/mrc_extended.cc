@@ -34,14 +34,24 @@ T number_at(std::span<const std::byte> bytes, std::int64_t offset, bool is_swapp
   return std::bit_cast<T>(raw);
 }
 
-// Returns the bytes a section that SerialEM's flags announce (IMOD's description of the header).
-int bytes_of_section_flags(int flags) {
+// What SerialEM's flags announce in the record of a section, in this order (IMOD's description of
+// the header).
+enum SerialEmFlag { kTilt = 1, kPieces = 2, kStage = 4, kMagnification = 8 };
+constexpr std::array<int, 6> kBytesOfFlag{2, 6, 4, 2, 2, 4};
+
+// Returns the bytes a section that the first `count` of SerialEM's flags announce.
+int bytes_of_section_flags(int flags, std::size_t count = kBytesOfFlag.size()) {
   int bytes = 0;
-  constexpr std::array<int, 6> kBytesOfFlag{2, 6, 4, 2, 2, 4};
-  for (std::size_t bit = 0; bit < kBytesOfFlag.size(); ++bit) {
+  for (std::size_t bit = 0; bit < count; ++bit) {
     if ((flags >> bit) & 1) bytes += kBytesOfFlag[bit];
   }
   return bytes;
+}
+
+// Returns the offset in a record of SerialEM of what a flag announces.
+int offset_of(SerialEmFlag flag, int flags) {
+  return bytes_of_section_flags(
+      flags, static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(flag))));
 }
 
 // Takes the angles of all sections, if every one of them can be. Equal ones are not those of a tilt
@@ -82,15 +92,14 @@ void take_axis(double axis_deg, MrcHeader& header) {
     header.extended_axis_deg = std::remainder(axis_deg, 360.0);
 }
 
-// Tells whether two sections have the same place along Z, by the coordinates of pieces after the
-// tilt.
+// Tells whether two sections have the same place along Z, by the coordinates of pieces.
 bool has_pieces(std::span<const std::byte> extended, const ExtendedRecords& records,
                 const MrcHeader& header) {
-  constexpr std::int64_t kZ = 6;
+  const std::int64_t z = offset_of(kPieces, records.flags) + 4;  // after x and y
   std::set<std::int16_t> places;
   for (std::int64_t section = 0; section < header.nz; ++section)
     if (!places
-             .insert(number_at<std::int16_t>(extended, section * records.bytes_per_section + kZ,
+             .insert(number_at<std::int16_t>(extended, section * records.bytes_per_section + z,
                                              header.is_byte_swapped))
              .second)
       return true;
@@ -99,12 +108,21 @@ bool has_pieces(std::span<const std::byte> extended, const ExtendedRecords& reco
 
 void read_serialem(std::span<const std::byte> extended, const ExtendedRecords& records,
                    MrcHeader& header) {
-  header.has_pieces = records.has_piece_coordinates && has_pieces(extended, records, header);
+  const auto number = [&](SerialEmFlag flag, std::int64_t section) {
+    return static_cast<double>(number_at<std::int16_t>(
+        extended, section * records.bytes_per_section + offset_of(flag, records.flags),
+        header.is_byte_swapped));
+  };
+  header.has_pieces = (records.flags & kPieces) != 0 && has_pieces(extended, records, header);
+  if ((records.flags & kMagnification) != 0)
+    note_difference(
+        "a magnification over 100",
+        [&](std::int64_t section) { return std::optional(number(kMagnification, section)); }, 0.0,
+        header);
+  if ((records.flags & kTilt) == 0) return;
   std::vector<double> tilts_deg;
   for (std::int64_t section = 0; section < header.nz; ++section)
-    tilts_deg.push_back(number_at<std::int16_t>(extended, section * records.bytes_per_section,
-                                                header.is_byte_swapped) /
-                        100.0);
+    tilts_deg.push_back(number(kTilt, section) / 100.0);
   header.extended_tilt_deg = std::move(tilts_deg);
 }
 
@@ -230,11 +248,12 @@ ExtendedRecords find_extended_records(const MrcHeaderBytes& bytes, const MrcHead
   const bool is_serialem =
       type == "SERI" || (type.empty() && first == bytes_of_section_flags(static_cast<int>(second)));
   if (is_serialem) {
-    if (!(second & 1) || first < 2 || !fits(first)) return {};
-    constexpr int kPieces = 2;
+    if (first < 2 || !fits(first)) return {};
+    std::size_t count = kBytesOfFlag.size();
+    while (bytes_of_section_flags(static_cast<int>(second), count) > first) --count;
     return {.layout = ExtendedLayout::kSerialEm,
             .bytes_per_section = first,
-            .has_piece_coordinates = (second & kPieces) != 0 && first >= 8};
+            .flags = static_cast<int>(second) & ((1 << count) - 1)};
   }
   if ((!type.empty() && type != "AGAR") || first < 0 || second < 1) return {};
   const std::int64_t record = 4 * (first + second);

@@ -21,10 +21,10 @@ enum class ExtendedLayout {
 struct ExtendedRecords {
   ExtendedLayout layout = ExtendedLayout::kNone;
   std::int64_t bytes_per_section = 0;
-  std::int64_t first_float = 0;        ///< byte of the record (kFloats)
-  std::int64_t num_floats = 0;         ///< (kFloats)
-  bool is_fei = false;                 ///< kFloats: FEI wrote it, whose axis has the opposite sign
-  bool has_piece_coordinates = false;  ///< kSerialEm: after the tilt
+  std::int64_t first_float = 0;  ///< byte of the record (kFloats)
+  std::int64_t num_floats = 0;   ///< (kFloats)
+  bool is_fei = false;           ///< kFloats: FEI wrote it, whose axis has the opposite sign
+  int flags = 0;                 ///< kSerialEm: of what a record has
 };
 
 /// Returns the layout of the extended header of a file with this fixed header. The record of kFei

@@ -127,6 +127,23 @@ TEST(Mrc, PiecesOfMontagesByTheHeaderOfSerialEm) {
   };
   EXPECT_TRUE(header_with_extended(records(0), "SERI", 8, 3).has_pieces);
   EXPECT_FALSE(header_with_extended(records(1), "SERI", 8, 3).has_pieces);
+  // Without the tilts, the places begin the record.
+  const MrcHeader untilted =
+      header_with_extended(records(0).substr(2) + std::string(2, '\0'), "SERI", 8, 2);
+  EXPECT_TRUE(untilted.has_pieces);
+  EXPECT_TRUE(untilted.extended_tilt_deg.empty());
+}
+
+TEST(Mrc, MagnificationsThatDifferByTheHeaderOfSerialEm) {
+  constexpr std::int16_t kTiltAndMagnification = 9;
+  const auto difference = [&](std::int16_t second) {
+    const std::vector<std::int16_t> records{-6000, 330, 0, second, 6000, 330};
+    const std::string extended(reinterpret_cast<const char*>(records.data()), 12);
+    return header_with_extended(extended, "SERI", 4, kTiltAndMagnification).extended_difference;
+  };
+  EXPECT_EQ(difference(330), "");
+  EXPECT_EQ(difference(420),
+            "a magnification over 100 of 420 in section 2, and of 330 in the first");
 }
 
 TEST(Mrc, RecordsOfFei1) {

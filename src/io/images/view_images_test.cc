@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "expect_parts.h"
+#include "io/images/image_stack.h"
 #include "io/images/mrc.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
@@ -45,6 +46,23 @@ TEST(ViewImages, AreFoundFromTheProjectsFolder) {
   EXPECT_EQ(find_listed_file("Motion/a.mrc", list), scratch / "Motion/a.mrc");
   expect_parts(message_of<Error>([&] { find_listed_file("Motion/b.mrc", list); }),
                {"TS.star", "Motion/b.mrc", "project's folder"});
+}
+
+TEST(ViewImages, WhoseTiltAxesDifferSaySo) {
+  const ScratchDirectory scratch;
+  const auto image = [&](const char* name, const char* axis) {
+    MrcSpec spec{.nx = 4, .ny = 3, .nz = 1, .mode = MrcMode::kInt16, .labels = {}};
+    spec.labels = {std::string("Tilt axis angle = ") + axis + ", binning = 1"};
+    MrcWriter(scratch / name, spec).close();
+    return ImageInFile{.file = scratch / name, .section = {}};
+  };
+  const auto difference = [&](const char* second) {
+    return image_stack_of_files({image("a.mrc", "85.3"), image("b.mrc", second)}, "the images")
+        ->header()
+        .extended_difference;
+  };
+  EXPECT_EQ(difference("85"), "");
+  expect_parts(difference("12"), {"a tilt axis in degrees of 12 in", "b.mrc", "85.3"});
 }
 
 TEST(ViewImages, MayBeSectionsOfAStack) {

@@ -36,9 +36,8 @@ OutputFolder::OutputFolder(const fs::path& path) : path_(fs::absolute(path).lexi
     first_made_ = folder;
   fs::create_directories(path_, error);
   if (!error && fs::is_directory(path_)) return;
-  throw Error(
-      fmt::format("the folder '{}' cannot be made ({}): give another with -o that can be written",
-                  path.string(), error ? error.message() : "something else has that name"));
+  throw Error(fmt::format("the folder '{}' cannot be made ({}): give another folder", path.string(),
+                          error ? error.message() : "something else has that name"));
 }
 
 OutputFolder::~OutputFolder() {
@@ -56,7 +55,7 @@ ScratchFolder::ScratchFolder(const fs::path& folder, const char* name) : path_(f
     throw Error(fmt::format(
         "'{}' is not of tomofield, or holds files that it did not put there: move it away",
         path_.string()));
-  throw Error(fmt::format("the folder '{}' cannot be written ({}): give another with -o",
+  throw Error(fmt::format("the folder '{}' cannot be written ({}): give another folder",
                           folder.string(), error.message()));
 }
 

@@ -116,6 +116,11 @@ void ScratchMemory::make_file(const char* noun) {
   }
   if (memory == MAP_FAILED) {
     close(std::exchange(file_, -1));
+    if (code == ENOMEM)
+      throw Error(
+          fmt::format("not enough memory for {}: {} bytes of address space are needed, "
+                      "which `ulimit -v` limits",
+                      noun, size_));
     throw Error(fmt::format("cannot reserve {} bytes for {} in {} ({}): free some space there",
                             size_, noun, directory_.string(), std::strerror(code)));
   }

@@ -5,7 +5,10 @@
 
 #include <csignal>
 #include <cstddef>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <vector>
 
 #include "scratch_directory.h"
@@ -54,6 +57,30 @@ TEST(ScratchMemory, LeavesNoFile) {
     EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
   }
   EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
+}
+
+// A limit of the address space is no full disk.
+TEST(ScratchMemory, ThatCannotBeMappedIsNoFaultOfTheDisk) {
+  const testing::ScratchDirectory scratch;
+  constexpr std::size_t kLarge = std::size_t{1} << 28;
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto fault = [&] {
+    constexpr rlim_t kMore = std::size_t{1} << 26;
+    struct rlimit limit {};
+    getrlimit(RLIMIT_AS, &limit);
+    std::size_t used_pages = 0;
+    std::ifstream("/proc/self/statm") >> used_pages;
+    limit.rlim_cur = used_pages * kPage + kMore;
+    setrlimit(RLIMIT_AS, &limit);
+    try {
+      const ScratchMemory memory(kLarge, "the bytes", scratch.path(), /*in_memory_bytes=*/0);
+    } catch (const Error& error) {
+      std::fputs(error.what(), stderr);
+      std::_Exit(2);
+    }
+    std::_Exit(0);
+  };
+  EXPECT_EXIT(fault(), ::testing::ExitedWithCode(2), "not enough memory for the bytes.*ulimit -v");
 }
 
 // Lets files of this process be no larger than some bytes for as long as it lives.

@@ -85,6 +85,9 @@ struct Mdoc {
   std::optional<std::array<std::int64_t, 2>> image_size_px;  ///< ImageSize: of what PixelSpacing is
   std::string image_file;  ///< ImageFile: the stack, without its folders
   std::vector<MdocSection> sections;
+  /// Says for messages what the file states twice and differently: two magnifications or binnings,
+  /// or two tilt axes of which one is taken.
+  std::vector<std::string> differences;
 };
 
 /// Returns what stands for the angle in SerialEM's title "Tilt axis angle = 85.9, binning = 1 …" of
@@ -92,6 +95,12 @@ struct Mdoc {
 std::optional<std::string_view> axis_of_title(std::string_view title);
 /// Does the same for Tomography's title "TiltAxisAngle = -175.9  Binning = 1 …".
 std::optional<std::string_view> tomography_axis_of_title(std::string_view title);
+
+/// Returns the tilt axes in degrees that SerialEM's titles among the labels of a stack state. One
+/// that was rounded is no second axis.
+std::vector<double> axes_of_labels(const std::vector<std::string>& labels);
+/// Tells whether two angles of a tilt axis are not the same one, rounded.
+bool are_two_axes(double a_deg, double b_deg);
 
 /// Sets the axis of an .mdoc from a TiltAxisAngle and the RotationAngle of its first section.
 /// Versions of Tomography write the former in three ways, which the latter tells apart, as in IMOD

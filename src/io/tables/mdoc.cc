@@ -75,17 +75,24 @@ void read_title(const std::filesystem::path& path, const TextLine& line, StatedA
   set(tomography_axis_of_title(line.text), axes.tomography);
 }
 
-// Tells whether sections state two tilt axes, and not one that was rounded.
-bool are_two_axes(const AxisAngle& a, double b_deg) {
-  constexpr double kSame_deg = 1.0;
-  return std::fabs(std::remainder(a.value - b_deg, 360.0)) > kSame_deg;
-}
-
 [[noreturn]] void throw_two_axes(const std::filesystem::path& path, std::string_view key,
                                  const AxisAngle& first, const AxisAngle& other) {
   throw Error(fmt::format(
       "'{}', line {}: {} is {}°, and {}° in line {}: a series has one tilt axis, so correct it",
       path.string(), other.line, key, other.value, first.value, first.line));
+}
+
+// Notes if a title and TiltAxisAngle state two axes.
+void note_other_axis(const StatedAxes& axes, Mdoc& mdoc) {
+  if (!axes.entry || !mdoc.tilt_axis_deg) return;
+  Mdoc by_entry = mdoc;
+  set_axis_of_tomography(*axes.entry, /*is_title=*/false, by_entry);
+  if (are_two_axes(by_entry.tilt_axis_deg->value, mdoc.tilt_axis_deg->value))
+    mdoc.differences.push_back(
+        fmt::format("a tilt axis of {}° in line {}, which is taken, and of {}° in line {}: give "
+                    "the right one with --tilt-axis",
+                    mdoc.tilt_axis_deg->value, mdoc.tilt_axis_deg->line,
+                    by_entry.tilt_axis_deg->value, axes.entry->line));
 }
 
 // Sets the axis of the first of the angles there are.
@@ -101,6 +108,7 @@ void choose_axis(const std::filesystem::path& path, const StatedAxes& axes, Mdoc
       throw_two_axes(path, "RotationAngle", *axes.rotation, *axes.other_rotation);
     mdoc.lone_rotation_deg = axes.rotation;
   }
+  note_other_axis(axes, mdoc);
 }
 
 constexpr double kLargestDefocus_um = 1000;
@@ -237,9 +245,30 @@ void read_rotation(const std::filesystem::path& path, const TextLine& line, cons
   const AxisAngle stated{*angle_deg, line.number};
   if (!axes.rotation)
     axes.rotation = stated;
-  else if (!axes.other_rotation && are_two_axes(*axes.rotation, *angle_deg))
+  else if (!axes.other_rotation && are_two_axes(axes.rotation->value, *angle_deg))
     axes.other_rotation = stated;
 }
+
+// Notes where sections state images of another magnification or binning than the first one's.
+class Magnifications {
+ public:
+  void read(const TextLine& line, const KeyValue& entry, Mdoc& mdoc) {
+    if (entry.key != "Magnification" && entry.key != "Binning") return;
+    const auto number = parse_number(entry.value);
+    if (!number || *number == 0.0) return;
+    const auto [first, is_new] = first_.emplace(entry.key, NumberLine{*number, line.number});
+    if (is_new || first->second.value == *number || is_noted_) return;
+    is_noted_ = true;
+    mdoc.differences.push_back(
+        fmt::format("{} = {} in line {}, and {} in line {}: the views of a series have one size of "
+                    "pixels, so leave those of another out (--exclude)",
+                    entry.key, first->second.value, first->second.line, *number, line.number));
+  }
+
+ private:
+  std::map<std::string, NumberLine, std::less<>> first_;
+  bool is_noted_ = false;
+};
 
 // The entries of a section that have been read: a second one must say the same.
 class EntriesOfSection {
@@ -315,7 +344,7 @@ bool read_common_entry(const std::filesystem::path& path, const TextLine& line,
   } else if (entry.key == "TiltAxisAngle") {
     const double axis_deg = require_number(path, line, entry.value, base::kLargestAngle_deg);
     const AxisAngle stated{axis_deg, line.number};
-    if (axes.entry && are_two_axes(*axes.entry, axis_deg))
+    if (axes.entry && are_two_axes(axes.entry->value, axis_deg))
       throw_two_axes(path, entry.key, *axes.entry, stated);
     if (!axes.entry) axes.entry = stated;
   } else if (entry.key == "Voltage") {
@@ -353,6 +382,7 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
   // Lines below a head of another kind, such as [MontSection = 0], are not of the section before.
   enum class Part { kHead, kSection, kOther } part = Part::kHead;
   EntriesOfSection entries;
+  Magnifications magnifications;
   for (const TextLine& line : read_text_lines(path)) {
     if (line.text.starts_with("[T")) {
       read_title(path, line, axes);  // stands anywhere, and does not end a section
@@ -373,7 +403,10 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
     if (entry.value.empty()) continue;  // Leginon writes entries without a value
     if (entry.key == "RotationAngle") read_rotation(path, line, entry, axes);
     if (part == Part::kOther) continue;
-    if (part == Part::kSection) entries.require_new(path, line, entry);
+    if (part == Part::kSection) {
+      entries.require_new(path, line, entry);
+      magnifications.read(line, entry, mdoc);
+    }
     if (read_common_entry(path, line, entry, axes, mdoc)) continue;
     if (part == Part::kSection)
       read_section_entry(path, line, entry, &mdoc.sections.back());

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "io/tables/alignment_files.h"
@@ -29,6 +30,23 @@ std::optional<std::string_view> axis_of_title(std::string_view title) {
 
 std::optional<std::string_view> tomography_axis_of_title(std::string_view title) {
   return word_after(title, "TiltAxisAngle");
+}
+
+bool are_two_axes(double a_deg, double b_deg) {
+  constexpr double kSame_deg = 1.0;
+  return std::fabs(std::remainder(a_deg - b_deg, 360.0)) > kSame_deg;
+}
+
+std::vector<double> axes_of_labels(const std::vector<std::string>& labels) {
+  std::vector<double> axes_deg;
+  for (const std::string& label : labels) {
+    const auto word = axis_of_title(label);
+    const auto axis_deg = word ? parse_number(*word, base::kLargestAngle_deg) : std::nullopt;
+    if (axis_deg &&
+        std::ranges::all_of(axes_deg, [&](double other) { return are_two_axes(*axis_deg, other); }))
+      axes_deg.push_back(*axis_deg);
+  }
+  return axes_deg;
 }
 
 void set_axis_of_tomography(const AxisAngle& stated, bool is_title, Mdoc& mdoc) {

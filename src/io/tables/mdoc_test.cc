@@ -67,6 +67,13 @@ TEST(Mdoc, AxisComesFromTheTitleAndNeverFromRotationAngle) {
   EXPECT_EQ(axis("TiltAxisAngle = 176.5\n" + title)->line, 2);
   EXPECT_EQ(axis(title + "\nTiltAxisAngle = 176.5")->value, -94.8);
   EXPECT_EQ(axis("TiltAxisAngle = 176.5")->value, 176.5);
+  const auto differences = [&](const std::string& text) {
+    return read_mdoc(scratch.write("a.mdoc", text + "\n[ZValue = 0]\n")).differences;
+  };
+  ASSERT_EQ(differences("TiltAxisAngle = 176.5\n" + title).size(), 1u);
+  expect_parts(differences("TiltAxisAngle = 176.5\n" + title)[0],
+               {"-94.8° in line 2, which is taken", "176.5° in line 1", "--tilt-axis"});
+  EXPECT_TRUE(differences("TiltAxisAngle = -94.6\n" + title).empty());
   EXPECT_EQ(axis("[T = SerialEM: Digitized on EMBL Krios]"), std::nullopt);
   expect_parts(message_of<Error>([&] { axis("[T = Tilt axis angle = steep, binning = 1]"); }),
                {"a.mdoc", "line 1", "steep"});
@@ -126,6 +133,22 @@ TEST(Mdoc, SectionsThatStateTwoAxesAreRefused) {
     expect_parts(message_of<Error>([&] { read(key, "20", "85"); }),
                  {"a.mdoc", "line 4", key, "85", "20", "line 2"});
   expect_parts(message_of<Error>([&] { read("TiltAxisAngle", "0", "85"); }), {"line 4", "line 2"});
+}
+
+TEST(Mdoc, NotesTwoMagnifications) {
+  const ScratchDirectory scratch;
+  for (const char* key : {"Magnification", "Binning"}) {
+    const auto differences = [&](const char* second) {
+      return read_mdoc(scratch.write("a.mdoc", fmt::format("[ZValue = 0]\n{0} = 2\n[ZValue = 1]\n"
+                                                           "{0} = {1}\n[ZValue = 2]\n{0} = {1}\n",
+                                                           key, second)))
+          .differences;
+    };
+    EXPECT_TRUE(differences("2").empty());
+    EXPECT_TRUE(differences("0").empty());  // not known
+    ASSERT_EQ(differences("4").size(), 1u);
+    expect_parts(differences("4")[0], {key, "= 2 in line 2, and 4 in line 4", "--exclude"});
+  }
 }
 
 TEST(Mdoc, ReadsTheAxisOfTomographyByRotationAngle) {

@@ -173,6 +173,20 @@ bool lists_tomograms(const std::filesystem::path& path) {
   return find_table(read_star_file(path), "rlnTomoTiltSeriesStarFile") != nullptr;
 }
 
+// Throws Error if a table beside that of the tomograms states something of them.
+void require_one_table(const std::filesystem::path& path, const std::vector<StarTable>& tables,
+                       const StarTable& of_tomograms) {
+  for (const StarTable& other : tables)
+    for (const char* column :
+         {"rlnVoltage", "rlnSphericalAberration", "rlnAmplitudeContrast",
+          "rlnTomoTiltSeriesPixelSize", "rlnTomoHand", "rlnTomoDefocusSlope", "rlnMtfFileName"})
+      if (&other != &of_tomograms && other.has_column(column))
+        throw Error(
+            fmt::format("'{}' states _{} in its table 'data_{}', and RELION has it in that of the "
+                        "tomograms, 'data_{}': move it there, or leave it out",
+                        path.string(), column, other.name(), of_tomograms.name()));
+}
+
 RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
   const std::vector<StarTable> tables = read_star_file(path);
   const StarTable* const table = find_only_table(path, tables, "rlnTomoTiltSeriesStarFile");
@@ -182,6 +196,7 @@ RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
                     "tomograms.star of RELION 5 (those of RELION 4 are not read)",
                     path.string()));
   }
+  require_one_table(path, tables, *table);
   RelionTomograms all{*table, {}};
   for (std::size_t i = 0; i < table->num_rows(); ++i) {
     const StarRow row(path, *table, i);

@@ -99,6 +99,12 @@ TEST(RelionTomograms, AreReadWithTheirColumns) {
   EXPECT_EQ(all.tomograms[0].size_px, (std::array<std::int64_t, 3>{4092, 4000, 1392}));
   EXPECT_EQ(all.tomograms[1].size_px, std::nullopt);
   EXPECT_EQ(all.table.columns().size(), 8u);
+  const auto two_tables =
+      scratch.write("two.star",
+                    "data_global\nloop_\n_rlnTomoName #1\n_rlnTomoTiltSeriesStarFile #2\n"
+                    "_rlnVoltage #3\na a.star 300\n\ndata_optics\nloop_\n_rlnVoltage #1\n200\n");
+  expect_parts(message_of<Error>([&] { read_relion_tomograms(two_tables); }),
+               {"two.star", "_rlnVoltage", "data_optics", "data_global"});
   const auto views = scratch.write("TS_01.star", kRelionHead);
   EXPECT_FALSE(lists_tomograms(views));
   expect_parts(message_of<Error>([&] { read_relion_tomograms(views); }),
