@@ -274,7 +274,8 @@ std::optional<int> stored_tile_rows(const std::filesystem::path& path) {
 void require_state_of_fit(const std::filesystem::path& path) {
   if (output::load_training(path).integers.contains("fingerprint")) return;
   throw Error(
-      fmt::format("'{}' is no checkpoint: it has no state of a fit, as no compact model has one",
+      fmt::format("'{}' is no checkpoint: it has no state of a fit, as no compact model has one, "
+                  "of which `tomofield export` makes the tomogram",
                   path.string()));
 }
 
