@@ -137,6 +137,24 @@ def test_particles_of_relion_lie_on_the_middle_voxel(folder, box, angpix):
         np.testing.assert_allclose(found, (PLACES[i] - SIZE / 2) * PIXEL_A, atol=1e-4)
 
 
+def test_angles_of_subtomograms_that_are_not_stated_are_0(folder):
+    """RELION takes them so."""
+    def cut_with(columns):
+        path = write_particles(folder)
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
+        for i, name in enumerate(columns):
+            text = text.replace(f" #{8 + i}\nTS_01", f" #{8 + i}\n_rlnTomoSubtomogram{name} #{9 + i}\nTS_01")
+        text = text.replace("10 20 30 1\n", "10 20 30 1 " + " ".join(columns.values()) + "\n")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+        cut_out(folder, "--particles", path, "--box", 12, "--angpix", 10.0)
+        return read_cut(folder)[0]
+    turned = cut_with({"Psi": "50"})
+    np.testing.assert_array_equal(turned, cut_with({"Rot": "0", "Tilt": "0", "Psi": "50"}))
+    assert np.abs(turned - cut_with({})).max() > 0.01 * turned.std()
+
+
 def test_points_of_imod_are_voxels_of_the_volume(folder):
     # The middle of the first voxel is at (0.5, 0.5, 0) in a model of IMOD.
     points = os.path.join(folder, "points.txt")

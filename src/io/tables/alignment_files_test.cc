@@ -198,6 +198,11 @@ TEST(AreTomoSections, EveryWayOfCounting) {
   EXPECT_EQ(assign({1, 2, 3}, {2}, 4), (Sections{0, 2, 3}));  // after removal, from 1
   EXPECT_EQ(assign({0, 2, 3}, {1}, 3), (Sections{0, 1, 2}));  // dark frames removed from the stack
   EXPECT_EQ(assign({0, 1, 2}, {1}, 3), (Sections{0, 1, 2}));
+  for (const std::int64_t num_sections : {3, 4})
+    expect_parts(message_of<Error>([&] {
+                   assign({0, 1, 2}, {9}, num_sections);
+                 }),
+                 {"a.aln", "dark frame 9", "4 sections with the dark ones"});
 }
 
 // Assigns rows of these tilts, numbered from `first`, beside dark frames whose section is 0.

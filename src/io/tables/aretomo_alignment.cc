@@ -80,6 +80,7 @@ void parse_header_line(const std::filesystem::path& path, const TextLine& line,
     alignment->beta_offset_deg = numbers[0];
   } else if (name == "Thickness") {
     require(1);
+    if (numbers[0] < 0) throw_row_error(path, line, "a thickness of 0 (unknown) or more");
     if (numbers[0] > 0) alignment->thickness = numbers[0];
   }
 }

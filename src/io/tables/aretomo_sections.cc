@@ -146,6 +146,13 @@ Sections assign_aretomo_sections(const AreTomoAlignment& alignment,
         aln.string(), num_rows, num_dark > 0 ? fmt::format(" and {} dark ones", num_dark) : "",
         stack.string(), num_sections));
   }
+  for (const Sections& dark : {alignment.dark_places, alignment.dark_sections})
+    for (const std::int64_t section : dark)
+      if (section < 0 || section > num_rows + num_dark)
+        throw Error(
+            fmt::format("'{}' has a dark frame {}, and {} sections with the dark ones: "
+                        "correct it",
+                        aln.string(), section, num_rows + num_dark));
   std::set<std::int64_t> numbers;
   for (const AreTomoRow& row : rows) numbers.insert(row.section);
   Sections dark_sections = alignment.dark_sections;

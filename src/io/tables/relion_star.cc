@@ -152,13 +152,26 @@ ListedView view_of(const StarRow& row, const StarTable& table, bool is_nominal) 
 // Notes what a table has and a rigid alignment cannot honour, and the first defocus that is left
 // out of it.
 void note_what_is_left_out(const StarTable& table, ViewTable& views) {
-  constexpr const char* kDeformation = "rlnTomoDeformationCoefficients";
-  for (std::size_t i = 0; table.has_column(kDeformation) && i < table.num_rows(); ++i) {
-    const std::string coefficients = table.find(i, kDeformation).value_or("");
-    if (coefficients.find_first_of("123456789") == std::string::npos) continue;
-    views.not_applied.emplace_back("deformations of the views (_rlnTomoDeformationCoefficients)");
-    break;
-  }
+  const auto has_digits = [](const std::string& text) {
+    return text.find_first_of("123456789") != std::string::npos;
+  };
+  const auto is_scaled = [](const std::string& text) {
+    const auto number = parse_number(text);
+    return number && *number != 1.0;
+  };
+  const auto note = [&](const char* column, const char* what, const auto& is_set) {
+    for (std::size_t i = 0; table.has_column(column) && i < table.num_rows(); ++i) {
+      if (!is_set(table.find(i, column).value_or(""))) continue;
+      return views.not_applied.push_back(fmt::format("{} (_{})", what, column));
+    }
+  };
+  note("rlnTomoDeformationCoefficients", "deformations of the views", has_digits);
+  for (const char* column : {"rlnMagMat00", "rlnMagMat11"})
+    note(column, "a magnification matrix", is_scaled);
+  for (const char* column : {"rlnMagMat01", "rlnMagMat10"})
+    note(column, "a magnification matrix", has_digits);
+  for (const char* column : {"rlnBeamTiltX", "rlnBeamTiltY", "rlnOddZernike", "rlnEvenZernike"})
+    note(column, "aberrations beside the defocus", has_digits);
   if (!table.has_column("rlnDefocusU")) return;
   const auto gap = std::ranges::find_if(
       views.views, [](const ListedView& view) { return !view.defocus.has_value(); });

@@ -166,6 +166,26 @@ TEST(ViewTable, DeformationsOfRelionAreNoted) {
   expect_parts(noted("[0,0.5,0,0]")[0], {"rlnTomoDeformationCoefficients"});
 }
 
+TEST(ViewTable, OpticsOfRelionThatAreNotAppliedAreNoted) {
+  const ScratchDirectory scratch;
+  const auto noted = [&](const std::string& column, const std::string& value) {
+    return read_view_table(
+               scratch.write("TS.star",
+                             "data_t\nloop_\n_rlnMicrographName #1\n_rlnTomoYTilt #2\n_rlnTomoZRot "
+                             "#3\n_rlnTomoXShiftAngst #4\n_rlnTomoYShiftAngst #5\n_" +
+                                 column + " #6\na.mrc 0 0 0 0 " + value + "\n"))
+        .not_applied;
+  };
+  for (const auto& [column, neutral, other] : {std::tuple("rlnMagMat00", "1.0", "1.02"),
+                                               {"rlnMagMat01", "0.0", "0.01"},
+                                               {"rlnBeamTiltX", "0", "-0.3"},
+                                               {"rlnOddZernike", "[0,0]", "[0,0.2]"}}) {
+    EXPECT_TRUE(noted(column, neutral).empty()) << column;
+    ASSERT_EQ(noted(column, other).size(), 1u) << column;
+    expect_parts(noted(column, other)[0], {column});
+  }
+}
+
 TEST(ViewTable, TablesOfOtherJobsOfRelionAreNamed) {
   const ScratchDirectory scratch;
   const auto refusal = [&](const std::string& column) {
