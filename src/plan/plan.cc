@@ -180,7 +180,7 @@ void check_before_reading(const options::ReconstructOptions& options,
   const tilt_series::PlannedSeries series(options.input(), processes);
   processes.run_collectively([&] {
     const RunPlan plan = require_possible_run(series, options, processes);
-    if (processes.is_root()) require_disk(plan, options);
+    if (processes.is_root() && options.run.align != Alignment::kOff) require_disk(plan, options);
   });
 }
 

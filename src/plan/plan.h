@@ -48,8 +48,8 @@ RunPlan require_possible_run(
     const tilt_series::PlannedSeries& series, const options::ReconstructOptions& options,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
-/// Checks a run before its views are read and aligned, which takes long: throws Error as
-/// require_possible_run() does. Reads no view. Every process calls it.
+/// Checks a run before its views are read, which takes long: throws Error as require_possible_run()
+/// does, and, before an alignment, require_disk(). Reads no view. Every process calls it.
 void check_before_reading(
     const options::ReconstructOptions& options,
     const distributed::Communicator& processes = distributed::Communicator::alone());
