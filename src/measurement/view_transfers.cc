@@ -373,22 +373,19 @@ void set_defocus(const ViewOptions& options, int hand, const tilt_series::Planne
   transfer.is_flipped = options.is_phase_flipped;
 }
 
-// Refuses a contrast transfer that spreads detail over more pixels than the view has: its rings are
-// too narrow to be told apart, and no correction means anything (Crowther et al. 1996).
+// Refuses a contrast transfer that spreads detail over more pixels than the view has.
 void require_rings(const tilt_series::PlannedSeries& series, const tilt_series::View& view,
                    const microscope::ViewTransfer& transfer) {
   const double largest_A =
       std::max(std::fabs(transfer.defocus.u_A), std::fabs(transfer.defocus.v_A));
-  const double pixel_A = transfer.pixel_size_A;
-  const double spread_px = microscope::electron_wavelength_A(transfer.optics.voltage_kV) *
-                           largest_A / (2.0 * pixel_A * pixel_A);
+  const double spread_px = microscope::spread_px(transfer);
   const auto side = static_cast<double>(std::max(series.width(), series.height()));
   if (spread_px <= side) return;
   throw Error(
       fmt::format("the defocus of {:.4g} µm of section {} spreads detail over {:.3g} of its pixels "
                   "of {:.4g} Å, "
                   "and the view has {}: check the defocus and the pixel size, or give --ctf none",
-                  largest_A * 1e-4, view.section + 1, spread_px, pixel_A, side));
+                  largest_A * 1e-4, view.section + 1, spread_px, transfer.pixel_size_A, side));
 }
 
 // Warns of corrections that a stack has had, as its labels say, and that are applied all the same.

@@ -28,4 +28,11 @@ DefocusSlope slope_of_tilt(double tilt_deg, double pixel_size_A, DefocusHand han
   return {per_pixel_A * aligned.shift_x_px, per_pixel_A * aligned.a11, per_pixel_A * aligned.a12};
 }
 
+double spread_px(const ViewTransfer& transfer) {
+  const double largest_A =
+      std::max(std::fabs(transfer.defocus.u_A), std::fabs(transfer.defocus.v_A));
+  return electron_wavelength_A(transfer.optics.voltage_kV) * largest_A /
+         (2.0 * transfer.pixel_size_A * transfer.pixel_size_A);
+}
+
 }  // namespace tomofield::microscope

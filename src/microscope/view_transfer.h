@@ -59,4 +59,9 @@ struct ViewTransfer {
   }
 };
 
+/// Returns over how many pixels the defocus spreads the finest detail of an image, λ Δz / (2 p²).
+/// Where these are more than the image has, the rings of the transfer are too narrow to be told
+/// apart, and no correction means anything (Crowther et al. 1996).
+double spread_px(const ViewTransfer& transfer);
+
 }  // namespace tomofield::microscope

@@ -8,6 +8,7 @@
 
 #include "base/plausible.h"
 #include "base/random.h"
+#include "microscope/view_transfer.h"
 
 namespace tomofield::simulate {
 namespace {
@@ -25,6 +26,16 @@ std::int64_t count_views(const TiltRange& tilts) {
 
 double largest_tilt_deg(const TiltRange& tilts) {
   return std::max(std::abs(tilts.first_deg), std::abs(tilts.last_deg));
+}
+
+// Returns over how many pixels the largest defocus spreads detail.
+double largest_spread_px(const Imaging& imaging, double voxel_size_A) {
+  constexpr double kAngstroms_in_um = 1e4;
+  microscope::ViewTransfer transfer{.optics = imaging.optics, .defocus = {}, .slope = {}};
+  transfer.pixel_size_A = voxel_size_A;
+  transfer.defocus.u_A =
+      kAngstroms_in_um * (imaging.defocus->high_um + imaging.astigmatism_um / 2.0);
+  return microscope::spread_px(transfer);
 }
 
 std::optional<std::string> fault_of(const TiltRange& tilts) {
@@ -123,6 +134,11 @@ std::vector<std::string> SimulationOptions::validate() const {
     const auto [low, high] = *i.defocus;
     require(is_spread(low, 50.0) && high >= low && high <= 50.0, "the defocus in µm", high,
             "a range within 0 to 50, the smaller number first");
+    require(largest_spread_px(i, voxel_size_A) <= static_cast<double>(cell.size_px),
+            "the number of pixels over which the defocus spreads detail",
+            largest_spread_px(i, voxel_size_A),
+            fmt::format("at most {}, as views have: take a smaller defocus, larger voxels or views",
+                        cell.size_px));
   }
   for (const ParticleFile& file : particle_files)
     require(std::isfinite(file.count) && file.count > 0.0 && file.count <= 1e5,

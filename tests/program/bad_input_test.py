@@ -266,6 +266,15 @@ def test_contrast_transfers_that_no_view_can_show(refuse_series, stack, path):
                       "--cs", 2.7, "--amplitude-contrast", 0.07)
 
 
+def test_simulated_contrast_transfers_that_no_view_can_show(path):
+    """They would take any time and memory, and no signal would stop them."""
+    for voxel_A, defocus_um in ((1, "50:50"), (0.001, "2:4"), (1, "4:4")):
+        said = harness.tomofield("simulate", path("rings"), "--size", 48, "--thickness", 24, "--tilts=-60:60:20",
+                                 "--voxel-size", voxel_A, "--defocus", defocus_um)
+        assert said.returncode == 2 and "smaller defocus" in said.stderr, said
+    assert not os.path.exists(path("rings"))
+
+
 def test_exposures_that_are_none(path, refuse_series, stack, text_file):
     for key in ("ExposureDose", "PriorRecordDose"):
         for value in ("nan", "-3", "much"):
