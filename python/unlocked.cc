@@ -4,6 +4,7 @@
 #include <tomofield/error.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -11,6 +12,7 @@
 #include <mutex>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "base/progress.h"
 #include "base/threads/stoppable_loops.h"
@@ -24,11 +26,12 @@ namespace py = pybind11;
 struct Calls {
   std::mutex mutex;
   std::condition_variable has_changed;
-  int count = 0;           // guarded by the mutex, as are the next ones
-  int in_user_code = 0;    // of these calls
-  bool is_over = false;    // the interpreter ends
-  std::thread::id ending;  // the thread that ends it
-  bool are_left = false;   // and waits for none of them any more
+  int count = 0;                       // guarded by the mutex, as are the next ones
+  int in_user_code = 0;                // of these calls
+  bool is_over = false;                // the interpreter ends
+  std::thread::id ending;              // the thread that ends it
+  std::vector<unsigned long> stopped;  // identifiers of the threads that its end stops
+  bool are_left = false;               // and waits for none of them any more
 };
 
 // It is never destroyed: daemon threads live until the process ends.
@@ -70,10 +73,25 @@ auto stay_at_the_end(const Work& work) {
   }
 }
 
+// Waits for the threads that the end has stopped: what they do as they leave, such as printing,
+// would hold locks that the interpreter needs. It does not wait long for what does not end.
+void join_stopped_threads() {
+  constexpr double kPatience_s = 1.0;
+  std::vector<unsigned long> stopped;
+  {
+    const std::lock_guard lock(calls().mutex);
+    stopped = calls().stopped;
+  }
+  for (const py::handle thread : py::module_::import("threading").attr("enumerate")()) {
+    const py::object name = thread.attr("ident");
+    if (!name.is_none() && std::ranges::count(stopped, name.cast<unsigned long>()) > 0)
+      thread.attr("join")(kPatience_s);
+  }
+}
+
 // Code of the user may wait for what the ending thread holds. It gets some seconds, and the
 // interpreter then ends beside it.
 void wait_for_calls() {
-  if (getpid() != g_own_process) return;
   constexpr std::chrono::milliseconds kStep{100}, kPatience{5000};
   const py::gil_scoped_release released;
   std::unique_lock lock(calls().mutex);
@@ -89,6 +107,12 @@ void wait_for_calls() {
     end_if_interrupted();
     lock.lock();
   }
+}
+
+void end_calls() {
+  if (getpid() != g_own_process) return;
+  wait_for_calls();
+  join_stopped_threads();
 }
 
 }  // namespace
@@ -132,6 +156,7 @@ Unlocked::~Unlocked() {
   t_stops_anywhere = false;
   const bool is_left = [] {
     const std::lock_guard lock(calls().mutex);
+    if (calls().is_over) calls().stopped.push_back(PyThread_get_thread_ident());
     return calls().are_left;
   }();
   if (is_left) wait_for_the_end();  // it cannot have the lock any more
@@ -169,12 +194,14 @@ bool must_stop() {
   return calls().is_over;
 }
 
-// Python prints nothing for a thread that SystemExit ends. What a daemon thread prints as the
+// Python prints nothing for a thread that SystemExit ends. What a daemon thread prints while the
 // interpreter ends may hold the lock of stderr for ever, which aborts the process.
 void InterpreterEnds::raise() {
   const bool is_ending_thread = [] {
     const std::lock_guard lock(calls().mutex);
-    return calls().ending == std::this_thread::get_id();
+    if (calls().ending == std::this_thread::get_id()) return true;
+    calls().stopped.push_back(PyThread_get_thread_ident());
+    return false;
   }();
   if (!is_ending_thread) return PyErr_SetNone(PyExc_SystemExit);
   const auto type = py::module_::import("tomofield._core").attr("Error");
@@ -185,7 +212,7 @@ void wait_at_exit() {
   g_own_process = getpid();
   base::set_interruption(interrupt);
   base::set_loop_interruption(interrupt_loop);
-  py::module_::import("atexit").attr("register")(py::cpp_function(&wait_for_calls));
+  py::module_::import("atexit").attr("register")(py::cpp_function(&end_calls));
 }
 
 }  // namespace tomofield::python

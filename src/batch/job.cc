@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "io/images/mrc.h"
+#include "io/saving/output_lock.h"
 #include "output/output_paths.h"
 #include "record/run_summary_record.h"
 #include "tomofield/error.h"
@@ -102,7 +103,8 @@ bool has_checkpoint(const fs::path& output) {
 }
 
 bool can_resume(const fs::path& output) {
-  return has_checkpoint(output) || fs::exists(output::output_paths(output).alignment);
+  const output::OutputPaths paths = output::output_paths(output);
+  return has_checkpoint(output) || fs::exists(paths.alignment) || io::has_lock_file(paths.volume);
 }
 
 std::vector<std::string> command_of(const fs::path& program, const Job& job, int threads,

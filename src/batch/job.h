@@ -53,6 +53,7 @@ struct JobList {
   bool overwrites = false;  ///< replace what other runs have left
   /// When its batch began, in nanoseconds since 1970, which tells it from others in its folder.
   std::int64_t began_ns = 0;
+  bool chooses = false;  ///< trials of some jobs choose for all, before the others run
 };
 
 Needs needs_of(const record::PlanRecord& plan);
@@ -85,7 +86,8 @@ std::string reason_in_batch(const std::string& said, const std::filesystem::path
 std::optional<std::filesystem::file_time_type> last_progress(const std::filesystem::path& output);
 /// Returns whether a fit has begun: there is a checkpoint, or trials of --tune.
 bool has_checkpoint(const std::filesystem::path& output);
-/// Returns whether a run can continue: there is a checkpoint, or an alignment.
+/// Returns whether a run can continue: there is a checkpoint, an alignment, or the lock of a run
+/// that was killed before its first checkpoint, whose pictures may be in the way.
 bool can_resume(const std::filesystem::path& output);
 
 /// A run may continue or replace the files of an earlier one.

@@ -100,6 +100,7 @@ void write_jobs(const fs::path& file, const JobList& list) {
   io::write_json(file, {{"tomofield", TOMOFIELD_VERSION},
                         {"overwrites", list.overwrites},
                         {"began_ns", list.began_ns},
+                        {"chooses", list.chooses},
                         {"jobs", jobs}});
 }
 
@@ -108,6 +109,7 @@ JobList read_jobs(const fs::path& file) {
     JobList list;
     list.overwrites = document.at("overwrites").get<bool>();
     list.began_ns = io::integer_at(document, "began_ns", 0, INT64_MAX);
+    list.chooses = document.value("chooses", false);
     for (const json& job : document.at("jobs")) list.jobs.push_back(job_from(job));
     return list;
   };

@@ -3,13 +3,14 @@
 import json
 import os
 import signal
+import subprocess
 import time
 
 import numpy as np
 import pytest
 
 import harness
-from batch_test import QUICK, options_of, page, pattern, write_table
+from batch_test import QUICK, fake_sbatch, options_of, page, pattern, write_table
 
 # The options of QUICK that leave the total variation to trials.
 OPEN = QUICK[:QUICK.index("--tv-penalty")] + QUICK[QUICK.index("--tv-penalty") + 2:]
@@ -215,6 +216,15 @@ def test_series_that_state_a_part_of_the_choice_go_on(data, stated):
     before = commands(folder)
     harness.succeed(*command, "--skip-existing")
     assert commands(folder) == before
+
+
+def test_a_task_of_slurm_without_the_common_choice_says_so(data):
+    folder = harness.fresh_directory("choice_missing")
+    environment = fake_sbatch(folder, "55\\n")
+    harness.succeed("batch", *pattern(data), *OPEN, "--slurm", "-o", folder, env=environment)
+    task = subprocess.run(["sh", os.path.join(folder, "batch.sbatch")], capture_output=True, text=True,
+                          env={**environment, "SLURM_ARRAY_TASK_ID": "1"}, timeout=120, check=False)
+    assert task.returncode == 0 and "has not made its choice" in task.stderr, task
 
 
 def test_the_one_series_that_is_left_without_a_choice_is_named(data, each):

@@ -795,6 +795,18 @@ def test_a_series_that_another_run_writes_is_waited_for(data):
     assert "wait until it has ended" in said.stderr and "remove" not in said.stderr, said
 
 
+def test_a_series_that_was_killed_before_its_first_checkpoint_is_run_again(data):
+    """Its lock says whose the pictures are that its trials have drawn."""
+    folder = harness.fresh_directory("killed_early")
+    pathlib.Path(folder, "a_xy.png").write_bytes(b"a picture")
+    command = ["batch", *pattern(data), *QUICK, "--skip-existing", "-o", folder]
+    refused = harness.tomofield(*command)
+    assert refused.returncode == 2 and "remove 'a_xy.png'" in refused.stderr, refused
+    pathlib.Path(folder, ".a.mrc.tomofield-lock").write_text("process 1 on node7", encoding="ascii")
+    harness.tomofield(*command)
+    assert summary(folder)["a"]["state"] == "done"
+
+
 def test_a_series_that_is_killed_ends_alone(data):
     folder = harness.fresh_directory("killed")
     rows = [[os.path.join(data, name + ".mrc"), os.path.join(data, name + ".tlt"), epochs]

@@ -150,6 +150,13 @@ def on_small_disk(folder, kibibytes, environment, *command):
     return ended, ended.stdout.splitlines()[-1].removeprefix("left: ").split()
 
 
+def test_a_full_disk_is_the_reason_why_a_plan_says_nothing(series, tmp_path):
+    fill = 'dd if=/dev/zero of=fill bs=4k count=255 2>/dev/null; "$@"'
+    ended, _ = on_small_disk(tmp_path, 1024, {}, "sh", "-c", fill, "sh", harness.PROGRAM, "batch", series.stack,
+                             "--tlt", series.tlt, *harness.QUICK, "--dry-run", "-o", "out")
+    assert ended.returncode == 2 and "no space left" in ended.stderr, ended
+
+
 def test_a_disk_that_says_it_is_full_is_written_with_a_warning(library, series):
     ended = []
     told = series.reconstruct("told", run=lambda *words: ended.append(harness.succeed(

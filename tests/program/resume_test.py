@@ -249,6 +249,18 @@ def test_what_a_killed_run_leaves_before_its_first_checkpoint_is_replaced(comman
     assert results.same_as(undisturbed) and not results.leftovers()
 
 
+def test_a_run_that_is_stopped_after_its_alignment_is_told_how_to_go_on():
+    series = harness.Series("aligned")
+    output = os.path.join(series.directory, "aligned.mrc")
+    run = harness.start("reconstruct", *series.input, "--thickness", harness.THICKNESS, "--contrast", "bright",
+                        "--bead-diameter", 0, "--align", "refine", "--epochs", 2000, "-o", output)
+    while run.poll() is None and not os.path.exists(output.replace(".mrc", "_align.json")):
+        time.sleep(0.01)
+    run.send_signal(signal.SIGINT)
+    _, errors = run.communicate(timeout=60)
+    assert run.returncode == 130 and "and --resume" in errors, errors
+
+
 def test_resume_of_a_finished_run_writes_the_same_results(command, undisturbed):
     results = harness.fresh_results("finished")
     harness.succeed(*command(results))

@@ -363,6 +363,9 @@ builtins.last = Last()
     "tomofield.reconstruct(views, tilts, epochs=1000, thickness=16, contrast='bright', "
     "pixel_size_A=10, density_variation=1.0, prior='tv')",
     "[tomofield.score_volume(views, views) for _ in iter(int, 1)]",
+    "exec('try: [tomofield.score_volume(views, views) for _ in iter(int, 1)]\\nfinally: print(5, flush=True)')",
+    "exec('try: tomofield.reconstruct(views, tilts, epochs=1000, thickness=16, pixel_size_A=10, "
+    "density_variation=1.0, prior=\\'tv\\')\\nfinally: print(5, flush=True)')",
     "[tomofield.score_volume(wide, wide) for _ in iter(int, 1)]",  # most of it converts the arrays
     "model.sample(tomofield.Box((16, 16, 8), (700, 700, 700), euler_deg=(10, 20, 30)))"])
 def test_the_interpreter_ends_in_order_beside_a_daemon_thread(series, work):
@@ -391,7 +394,7 @@ builtins.last = Last()
     module = os.path.dirname(os.path.dirname(tomofield.__file__))
     for _ in range(3):
         ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
-                               env={**os.environ, "PYTHONPATH": module}, timeout=60, check=False)
+                               env={**os.environ, "PYTHONPATH": module, "PYTHONUNBUFFERED": ""}, timeout=60, check=False)
         assert ended.returncode == 0 and not ended.stderr, (ended.returncode, ended.stderr)
 
 

@@ -141,7 +141,16 @@ std::string reason_of_failure(int exit_status, const std::filesystem::path& log)
   if (exit_status > kSignal)
     return fmt::format("signal {} ended it{}", exit_status - kSignal,
                        said.empty() ? ", and it said nothing" : "; it said last: " + said);
-  return said.empty() ? fmt::format("it failed with status {}", exit_status) : said;
+  if (!said.empty()) return said;
+  std::error_code error;
+  const auto space = std::filesystem::space(log.parent_path(), error);
+  constexpr std::uintmax_t kRoomOfSentence = 1 << 14;
+  if (!error && space.available < kRoomOfSentence)
+    return fmt::format(
+        "it failed with status {}, and '{}' has no space left for what it said: free "
+        "some there",
+        exit_status, log.parent_path().string());
+  return fmt::format("it failed with status {}", exit_status);
 }
 
 std::string reason_of_failure(const std::filesystem::path& log) {

@@ -222,6 +222,10 @@ void run_task(const CLI::App& command, const BatchArguments& arguments) {
     const auto plan = batch::plan_choice(arguments.folder, /*continues=*/false, list.jobs);
     return choose_for_all(options, plan.choosing, threads, list);
   }
+  if (*arguments.task > 0 && list.chooses && !batch::read_choice(arguments.folder))
+    base::log_warning(
+        "the task that chooses for all series has not made its choice: this series chooses for "
+        "itself, and the batch with --overwrite makes a common choice");
   const auto time_is_up = [] { return stop_was_requested() && stop_status() == 128 + SIGUSR1; };
   const batch::TaskResult result = run_task(options, list, *arguments.task, threads, time_is_up);
   base::log_info(fmt::format("{}{}{}", base::name_of(result.state.progress),
@@ -261,6 +265,7 @@ void run(const CLI::App& command, const BatchArguments& arguments,
   batch::ChoicePlan choice;
   if (arguments.choose == batch::Choose::kOnce)
     choice = batch::plan_choice(options.folder, options.skips_existing, list.jobs);
+  list.chooses = !choice.choosing.empty();
   print_choosing(list, choice);
   require_words(list);
   const std::string script =

@@ -130,6 +130,8 @@ void require_finished(const reconstruction::RunResult& run,
     case reconstruction::Outcome::kStoppedTuning:
       if (options.fit.tune)
         throw stopped("the finished trials are in", paths.trials, options, leaves_trace);
+      if (std::filesystem::exists(paths.alignment) && options.run.align != Alignment::kOff)
+        throw stopped("the alignment is in", paths.alignment, options, leaves_trace);
       throw ExitStatus{stop_status(), "stopped before the first checkpoint"};
     case reconstruction::Outcome::kStoppedAligning:
       throw_stopped_alignment();
