@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <system_error>
 
 #include "base/log.h"
 #include "base/system/memory.h"
@@ -54,6 +55,15 @@ void settle_outputs(std::vector<Series>& all, const PlanOptions& options, base::
     outputs.push_back(series.output);
     if (io::is_file(series.input)) inputs.push_back(series.input);
   }
+  // The batch has the lock of its list, which the run of the series would meet.
+  std::error_code failed;
+  const fs::path list = fs::weakly_canonical(list_of(options.folder), failed);
+  for (const Series& series : all)
+    if (fs::weakly_canonical(series.output, failed) == list)
+      faults.add(
+          fmt::format("{}: the batch itself and this series would both write '{}': give the "
+                      "series another output",
+                      series.source, series.output.string()));
   check_names(all, faults);
   check_placeholders(all, options.common, faults);
   check_tomograms(all, options.common, faults);

@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "base/log.h"
@@ -64,9 +65,14 @@ std::set<std::string> volumes_of(const fs::path& file) {
   return volumes;
 }
 
-// Returns what `reconstruct` takes of a job: RELION's table, or the folder that has it.
+// Returns RELION's table of a job, whatever its name in the command: that of a link, or the folder.
 fs::path input_of(const Job& job) {
-  return job.command.size() < 2 ? fs::path() : fs::absolute(job.command[1]).lexically_normal();
+  if (job.command.size() < 2) return {};
+  std::error_code failed;
+  const fs::path input = job.command[1];
+  const fs::path table = fs::is_directory(input, failed) ? input / "tomograms.star" : input;
+  const fs::path file = fs::weakly_canonical(table, failed);
+  return failed ? fs::absolute(table).lexically_normal() : file;
 }
 
 }  // namespace

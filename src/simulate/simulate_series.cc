@@ -42,6 +42,10 @@ namespace fs = std::filesystem;
 constexpr std::uint64_t kNoiseStream = std::uint64_t{1} << 32;
 constexpr std::int64_t kTruthBatchVoxels = std::int64_t{1} << 22;
 
+fs::path reference_of(const std::string& kind, const fs::path& directory) {
+  return directory / fmt::format("particle_{}.mrc", kind);
+}
+
 struct OutputFiles {
   /// `kinds` are those of the specimen's particles.
   OutputFiles(const fs::path& directory, std::span<const ParticleKind> kinds)
@@ -59,18 +63,25 @@ struct OutputFiles {
         membranes(directory / "membranes.mrc"),
         particles(directory / "particles.star"),
         record(directory / "phantom.json") {
-    for (const ParticleKind& kind : kinds)
-      references.push_back(directory / fmt::format("particle_{}.mrc", kind.name));
+    for (const ParticleKind& kind : kinds) references.push_back(reference_of(kind.name, directory));
+    for (const std::string& kind : listed_kinds(particles)) {
+      const fs::path old = reference_of(kind, directory);
+      if (fs::is_regular_file(old) && std::ranges::find(references, old) == references.end())
+        old_references.push_back(old);
+    }
   }
   fs::path series, clean, truth, angles, recorded_angles, transforms, ctf, defocus, mdoc, even, odd,
       membranes, particles, record;
 
   std::vector<fs::path> references;  // densities of the kinds of particles
+  /// Densities of particles that the list of an earlier series has. This one does not write them.
+  std::vector<fs::path> old_references;
 
   std::vector<fs::path> all() const {
     std::vector<fs::path> files{series,  clean, truth, angles, recorded_angles, transforms, ctf,
                                 defocus, mdoc,  even,  odd,    membranes,       particles,  record};
     files.insert(files.end(), references.begin(), references.end());
+    files.insert(files.end(), old_references.begin(), old_references.end());
     return files;
   }
 };
@@ -269,17 +280,6 @@ void write_labels(const OutputFiles& files, const CryoSpecimen& specimen,
                  io::MrcMode::kFloat32, options, "density of a particle");
 }
 
-// Lets densities of particles go that an earlier series wrote and this one does not.
-void remove_old_references(const fs::path& directory, const OutputFiles& files,
-                           io::OutputSet& results) {
-  for (const auto& entry : fs::directory_iterator(directory)) {
-    const fs::path& file = entry.path();
-    if (file.filename().string().starts_with("particle_") && file.extension() == ".mrc" &&
-        std::ranges::find(files.references, file) == files.references.end())
-      results.remove_old(file);
-  }
-}
-
 void write_angles(const fs::path& path, const std::vector<SimulatedView>& views) {
   std::vector<double> angles_deg;
   for (const SimulatedView& view : views) angles_deg.push_back(view.tilt_deg);
@@ -422,7 +422,7 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
   else
     results.remove_old(files.truth);
   write_stacks(files, phantom, specimen, views, options, summary.sigma, results);
-  remove_old_references(directory, files, results);
+  for (const fs::path& file : files.old_references) results.remove_old(file);
   write_tables(files, views, options, results);
   write_phantom_record(files.record, options, phantom, views, summary);
   results.commit();

@@ -356,6 +356,20 @@ def test_a_table_for_relion_has_the_series_with_results():
     assert names("--overwrite", "--roi", "8,8,40,28") == []  # RELION has no place for a part
 
 
+def test_one_table_of_relion_by_two_names_is_joined():
+    folder = harness.fresh_directory("two_names")
+    star = pathlib.Path(star_projects.write_relion(folder, harness.Series("source")))
+    link = star.with_name("linked.star")
+    link.symlink_to(star)
+    for other in (star.parent, link):
+        results = os.path.join(folder, f"of_{other.name}")
+        table = write_table(os.path.join(folder, "list.csv"),
+                            [["stack", "series", "name"], [star, "TS_01", "TS_01"], [other, "TS_02", "TS_02"]])
+        harness.succeed("batch", table, *QUICK[2:], "-o", results)
+        joined = star_projects.read_rows(os.path.join(results, "tomograms.star"))
+        assert [row["rlnTomoName"] for row in joined] == ["TS_01", "TS_02"]
+
+
 def write_one_tomogram(folder, name):
     """Makes a project folder of RELION with one tomogram and returns its row in a table of a batch."""
     star = pathlib.Path(star_projects.write_relion(folder, harness.Series("source")))
@@ -545,6 +559,8 @@ def test_no_file_is_written_twice_or_replaces_an_input(data):
             assert "the series 'a' and the series 'b' would both write" in said, said
         said = refusal(path("results", "..", "results", "batch.rec"), "", *options)
         assert "the batch itself and the series 'a'" in said, said
+        said = refusal(path("results", "batch.json"), "", *options)
+        assert "the batch itself and this series would both write" in said, said
         for name in ("batch", "choice"):
             said = refusal("", "", *options, name=name)
             assert f"the batch itself and the series '{name}'" in said, said

@@ -343,7 +343,8 @@ def test_mistakes_are_named_before_anything_is_made(compare, refuse, series):
         refuse(folder, [fact], *options)
     refuse(folder, ["bad: ", "--weight"], "--also", "bad=baseline tv --weight -1")
     refuse(folder, ["bad: ", "--magic"], "--also", "bad=reconstruct --magic")
-    refuse(folder, ["bad: ", "no trace"], "--also", "bad=reconstruct --trace x.json")
+    for option in ("--trace x.json", "--choice x.json", "--plan=x.json", "--dry-run"):
+        refuse(folder, ["bad: ", "is not for a comparison"], "--also", f"bad=reconstruct {option}")
     refuse(folder, ["bad: ", "nowhere.toml"], "--also", "bad=reconstruct --config nowhere.toml")
     refuse(folder, ["part", "24 × 24 × 24", "sirt", "48 × 36 × 24"],
            "--also", "part=baseline sirt --roi 0,0,24,24")

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 
 import mrcfile
 import numpy as np
@@ -222,6 +223,20 @@ def test_a_density_is_not_replaced_by_the_series_that_is_made_of_it(counted):
                "--overwrite")
     assert said.returncode == 2 and "would replace the input" in said.stderr, said.stderr
     assert harness.read_bytes(density) == before
+
+
+def test_files_that_are_called_like_densities_stay(counted):
+    folder = harness.fresh_directory("called_like_densities")
+    mine = os.path.join(folder, "particle_mine.mrc")
+    shutil.copy(counted.path("particle_ribosome.mrc"), mine)
+    harness.succeed("simulate", folder, "--size", 48, "--thickness", 24, "--tilts=-60:60:20")
+    harness.succeed("simulate", folder, *COUNTED, "--particles", f"{mine},2", "--overwrite")
+    own = os.path.join(folder, "particle_particle_mine.mrc")
+    assert os.path.exists(mine) and os.path.exists(own)
+    said = harness.tomofield("simulate", folder, *COUNTED, "--particles", f"{own},2", "--overwrite")
+    assert said.returncode == 2 and "input" in said.stderr and os.path.exists(own), said
+    harness.succeed("simulate", folder, "--size", 48, "--thickness", 24, "--tilts=-60:60:20", "--overwrite")
+    assert os.path.exists(mine) and not os.path.exists(own)
 
 
 def test_particles_of_files_take_the_place_of_random_proteins(counted):

@@ -2,10 +2,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/log.h"
@@ -55,12 +57,16 @@ std::vector<std::string> series_words(const CLI::App& command,
   return words;
 }
 
-// Refuses an option that would write another file than those of the comparison.
-void require_no_trace(const compare::Method& method) {
-  for (const std::string& word : method.expanded)
-    if (word == "--trace" || word.starts_with("--trace="))
-      throw Error(fmt::format("{}: a comparison writes no trace: run `tomofield {}` by itself",
-                              method.name, fmt::join(method.arguments, " ")));
+// Refuses an option by which a run writes other files than those of the comparison, or none.
+void require_results_alone(const compare::Method& method) {
+  constexpr std::array<std::string_view, 5> kOthers{"--trace", "--plan", "--choice", "--grid",
+                                                    "--dry-run"};
+  for (const std::string& word : method.expanded) {
+    const auto flag = std::string_view(word).substr(0, word.find('='));
+    if (std::ranges::find(kOthers, flag) != kOthers.end())
+      throw Error(fmt::format("{}: {} is not for a comparison: run `tomofield {}` by itself",
+                              method.name, flag, fmt::join(method.arguments, " ")));
+  }
 }
 
 // Reads the configuration files of methods, for the files that these name.
@@ -72,7 +78,7 @@ void expand_methods(const CLI::App& program, std::vector<compare::Method>& metho
     } catch (const Error& error) {
       throw Error(fmt::format("{}: {}", method.name, error.what()));
     }
-    require_no_trace(method);
+    require_results_alone(method);
   }
 }
 

@@ -8,13 +8,18 @@
 #include "io/tables/star_file.h"
 #include "simulate/gaussian_rows.h"
 #include "simulate/rasterize.h"
+#include "tomofield/error.h"
 
 namespace tomofield::simulate {
+namespace {
+
+constexpr const char* kKind = "tomofieldParticleKind";
+
+}  // namespace
 
 std::string particle_list(const CryoSpecimen& specimen) {
-  io::StarTable table("particles",
-                      {"rlnCoordinateX", "rlnCoordinateY", "rlnCoordinateZ", "rlnAngleRot",
-                       "rlnAngleTilt", "rlnAnglePsi", "tomofieldParticleKind"});
+  io::StarTable table("particles", {"rlnCoordinateX", "rlnCoordinateY", "rlnCoordinateZ",
+                                    "rlnAngleRot", "rlnAngleTilt", "rlnAnglePsi", kKind});
   const base::Shape3& shape = specimen.phantom.shape;
   const Vector3 size{static_cast<double>(shape.nx), static_cast<double>(shape.ny),
                      static_cast<double>(shape.nz)};
@@ -31,6 +36,21 @@ std::string particle_list(const CryoSpecimen& specimen) {
     table.add_row(std::move(cells));
   }
   return io::star_file_text(table);
+}
+
+std::set<std::string> listed_kinds(const std::filesystem::path& list) {
+  std::set<std::string> kinds;
+  try {
+    const std::vector<io::StarTable> tables = io::read_star_file(list);
+    const io::StarTable* const table = io::find_table(tables, kKind);
+    for (std::size_t row = 0; table != nullptr && row < table->num_rows(); ++row) {
+      const std::string kind = table->find(row, kKind).value_or("");
+      if (std::filesystem::path(kind).filename() == kind) kinds.insert(kind);
+    }
+  } catch (const Error&) {
+    // There is none, or it is not of a simulation.
+  }
+  return kinds;
 }
 
 base::Volume reference_density(const ParticleKind& kind, double voxel_size_A) {

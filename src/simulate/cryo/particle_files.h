@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <set>
 #include <string>
 
 #include "base/volume.h"
@@ -12,6 +13,10 @@ namespace tomofield::simulate {
 /// in voxels of the truth, where voxel i covers [i, i + 1), as rlnCoordinateX, Y and Z; angles are
 /// rlnAngleRot, Tilt and Psi; the kind is tomofieldParticleKind.
 std::string particle_list(const CryoSpecimen& specimen);
+
+/// Returns the kinds of particles that such a file has; none if it is not there, or another one.
+/// A kind names a file, and no other folder.
+std::set<std::string> listed_kinds(const std::filesystem::path& list);
 
 /// Returns the density of a kind of particle in V above ice, in the orientation of zero angles, in
 /// a cube of an even number of voxels with the particle's origin in its centre.
