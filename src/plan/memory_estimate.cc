@@ -40,17 +40,6 @@ std::size_t band_memory(const measurement::Measurement& plan, const fit::Domain&
   return kSlabsOfBand * (2 * slab + views) + 3 * slab / kernels::kLanes;
 }
 
-// Returns the bytes of the vertices of one leaf a thread, of the largest leaves.
-std::size_t leaves_of_threads(const fit::Domain& domain) {
-  std::vector<std::size_t> bytes;
-  for (const field::LeafShape& shape : domain.shapes)
-    bytes.push_back(shape.vertices_xz() * static_cast<std::size_t>(shape.ny) * sizeof(float));
-  const auto count = std::min(std::ssize(bytes), std::ptrdiff_t{base::thread_count()});
-  const auto largest = std::span(bytes).first(static_cast<std::size_t>(count));
-  std::ranges::partial_sort(bytes, bytes.begin() + count, std::greater{});
-  return std::accumulate(largest.begin(), largest.end(), std::size_t{0});
-}
-
 // Returns the part of all parameters that this process keeps: its own and those of its neighbours
 // in `rows` rows beyond its bands.
 double part_of_parameters(const fit::Domain& domain, FieldKind kind,
@@ -65,15 +54,27 @@ double part_of_parameters(const fit::Domain& domain, FieldKind kind,
          static_cast<double>(field::count_parameters(kind, domain.shapes));
 }
 
-// Returns the bytes of the parameters, their gradient and two moments in the stage with the most.
-// When an adaptive tree changes, all but the gradient are there twice.
-double fitted_bytes(const fit::Domain& domain, const std::vector<fit::Stage>& stages,
-                    const FieldOptions& options, const distributed::Communicator& processes) {
-  const double copies = options.tree == TreeKind::kAdaptive ? 7 : 4;
-  double largest = 0;
-  for (const fit::Stage& s : stages)
-    largest = std::max(largest, copies * parameter_bytes(domain, options, s.field_kind, processes));
-  return largest;
+// Returns the part of all parameters that belongs to leaves that rays meet. Their gradient and
+// moments take memory; those of other leaves are never written.
+double part_that_rays_meet(const fit::Domain& domain, FieldKind kind) {
+  std::vector<field::LeafShape> met;
+  for (int i = 0; i < domain.tree.num_leaves(); ++i) {
+    const field::Square& square = domain.tree.leaf(i).square;
+    if (static_cast<double>(square.x0) < domain.support.x1 &&
+        static_cast<double>(square.x1()) > domain.support.x0 &&
+        static_cast<double>(square.y0) < domain.support.y1 &&
+        static_cast<double>(square.y1()) > domain.support.y0)
+      met.push_back(domain.shapes[static_cast<std::size_t>(i)]);
+  }
+  return static_cast<double>(field::count_parameters(kind, met)) /
+         static_cast<double>(field::count_parameters(kind, domain.shapes));
+}
+
+// Returns the number of parameters in a stage over that at full resolution.
+double part_in_stage(const fit::Domain& domain, const fit::Stage& stage) {
+  return static_cast<double>(
+             field::count_parameters(stage.field_kind, domain.shapes_in(domain.tree, stage.bin))) /
+         static_cast<double>(field::count_parameters(stage.field_kind, domain.shapes));
 }
 
 // Returns the bytes in use while plain vertices become factors; 0 if they do not.
@@ -149,6 +150,16 @@ std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domai
   return leaf + written;
 }
 
+std::size_t leaves_of_threads(const fit::Domain& domain) {
+  std::vector<std::size_t> bytes;
+  for (const field::LeafShape& shape : domain.shapes)
+    bytes.push_back(shape.vertices_xz() * static_cast<std::size_t>(shape.ny) * sizeof(float));
+  const auto count = std::min(std::ssize(bytes), std::ptrdiff_t{base::thread_count()});
+  const auto largest = std::span(bytes).first(static_cast<std::size_t>(count));
+  std::ranges::partial_sort(bytes, bytes.begin() + count, std::greater{});
+  return std::accumulate(largest.begin(), largest.end(), std::size_t{0});
+}
+
 int num_fitted_views(const measurement::Measurement& plan, const FitOptions& options) {
   const auto held_out = measurement::held_out_views(plan.geometry.tilt_deg, options.hold_out);
   return plan.geometry.num_views() - static_cast<int>(held_out.size());
@@ -168,7 +179,10 @@ std::size_t max_parameters(const fit::Domain& domain, const FieldOptions& option
     if (domain.tree.leaf(i).region != field::Region::kInterest) continue;
     if (num_inside++ == 0) first_inside = domain.shapes[static_cast<std::size_t>(i)];
   }
-  const std::int64_t more = options.leaf_budget - num_inside;
+  // A leaf may become four, but not sixteen (fit::TreeUpdates).
+  constexpr std::int64_t kMostOfOne = 4;
+  const std::int64_t more =
+      std::min<std::int64_t>(options.leaf_budget, kMostOfOne * num_inside) - num_inside;
   if (more <= 0) return now;
   const base::CheckedSize of_leaf = field::count_parameters(kind, {first_inside});
   // Copies of this many bytes can still be added up.
@@ -180,6 +194,22 @@ double parameter_bytes(const fit::Domain& domain, const FieldOptions& options, F
                        const distributed::Communicator& processes) {
   return static_cast<double>(sizeof(float) * max_parameters(domain, options, kind)) *
          part_of_parameters(domain, kind, processes);
+}
+
+double fitted_bytes(const fit::Domain& domain, const std::vector<fit::Stage>& stages,
+                    const FieldOptions& options, const distributed::Communicator& processes) {
+  constexpr double kCopiesThatRaysWrite = 3;  // the gradient and two moments
+  constexpr double kCopiesOfChange = 6;       // two of the parameters and of each moment
+  double largest = 0;
+  for (const fit::Stage& s : stages) {
+    const bool may_change = options.tree == TreeKind::kAdaptive && &s == &stages.front();
+    const double written = kCopiesThatRaysWrite * part_that_rays_meet(domain, s.field_kind);
+    const double copies =
+        may_change ? kCopiesOfChange + written / kCopiesThatRaysWrite : 1 + written;
+    largest = std::max(largest, copies * part_in_stage(domain, s) *
+                                    parameter_bytes(domain, options, s.field_kind, processes));
+  }
+  return largest;
 }
 
 std::size_t estimate_memory(const PlannedFit& planned, const std::vector<fit::Stage>& stages) {

@@ -67,21 +67,25 @@ std::size_t memory_of_halves(const tilt_series::PlannedSeries& series,
 // Returns the peak memory of trials, which are fits of a few rows side by side. Where leaves are
 // larger than the region, the field of a trial is as large as that of the run.
 std::size_t memory_of_trials(const measurement::Measurement& plan,
-                             const options::ReconstructOptions& options,
+                             const options::ReconstructOptions& options, int num_trials,
                              const distributed::Communicator& processes) {
-  constexpr int kMostSideBySide = 4;  // tune/automatic_choice.cc
-  constexpr int kCopies = 5;  // parameters, gradient, two moments, and a change of the stage
+  constexpr int kMostSideBySide = 4;        // tune/automatic_choice.cc
   constexpr std::int64_t kRowsBeyond = 16;  // tune::search_trial()
   const tune::TrialShape trial = tune::search_trial(options.field, options.fit);
   Rectangle rows = plan.roi;
   rows.y1 = std::min(rows.y1, rows.y0 + trial.rows + kRowsBeyond);
   const fit::Domain domain = fit::make_domain(plan.geometry, rows, trial.field);
-  std::size_t parameters = 0;
-  for (const fit::Stage& stage : fit::make_stages(trial.field, trial.fit))
-    parameters = std::max(parameters, max_parameters(domain, trial.field, stage.field_kind));
-  const int at_once = (kMostSideBySide + processes.size() - 1) / processes.size();
+  const double of_trial = fitted_bytes(domain, fit::make_stages(trial.field, trial.fit),
+                                       trial.field, distributed::Communicator::alone());
+  const int side_by_side = std::min(kMostSideBySide, num_trials);
+  const int at_once = (side_by_side + processes.size() - 1) / processes.size();
+  measurement::SlabViews::Shape rays = plan.rays_shape();
+  rays.num_rows = std::min(rays.num_rows, rows.height());
+  const std::size_t beside_it =
+      measurement::SlabViews::resident_memory(rays, 2) + thread_memory(plan, domain);
   return kProgramBytes + measurement::SlabViews::resident_memory(plan.rays_shape(), 0) +
-         static_cast<std::size_t>(at_once * kCopies) * parameters * sizeof(float);
+         leaves_of_threads(domain) +
+         static_cast<std::size_t>(at_once) * (static_cast<std::size_t>(of_trial) + beside_it);
 }
 
 // Refuses tilts that cannot be divided: each half needs views over the whole range.
@@ -146,7 +150,8 @@ RunPlan plan_run(const tilt_series::PlannedSeries& series, const options::Recons
                          ? run.tiles.memory_bytes
                          : estimate_memory({series, plan, domain, options, processes}, run.stages);
   if (run.num_trials > 0 && !plan.ray_geometry)
-    run.memory_bytes = std::max(run.memory_bytes, memory_of_trials(plan, options, processes));
+    run.memory_bytes =
+        std::max(run.memory_bytes, memory_of_trials(plan, options, run.num_trials, processes));
   run.most_vertices = most_vertices(domain);
   if (aligns && !plan.ray_geometry)
     run.memory_bytes =
