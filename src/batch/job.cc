@@ -79,7 +79,11 @@ std::string advice_on_files(const fs::path& output) {
 }
 
 std::string reason_in_batch(const std::string& said, const fs::path& output) {
-  const std::size_t advice = said.find("--overwrite");
+  std::size_t advice = said.npos;
+  // A name or a value that the message quotes may have the option in it, too.
+  for (const char* phrase :
+       {"give --overwrite", "or --overwrite to replace", "--overwrite starts over"})
+    advice = std::min(advice, said.find(phrase));
   if (advice == said.npos) return said;
   // Adding 1 makes the end of a clause that is not there the smallest.
   const std::size_t end = std::max(said.rfind(": ", advice) + 1, said.rfind("; ", advice) + 1) - 1;

@@ -117,22 +117,26 @@ void match_sections(const Sections& sections, io::CtfTable& table) {
   table.views = std::move(matched);
 }
 
-// Warns of a defocus that no image for phase contrast has, as of a file in µm or of a failed fit.
-void warn_of_small_defocus(const Sections& sections, const io::CtfTable& table) {
-  constexpr double kLeast_A = 1000.0;
+// Warns of a defocus that no image for phase contrast has, as of a file in another unit or of a
+// failed fit.
+void warn_of_unusual_defocus(const Sections& sections, const io::CtfTable& table) {
+  constexpr base::Interval kUsual_A{1000.0, 250'000.0};
+  const auto unusual = [&](const io::Defocus& defocus) -> std::optional<double> {
+    for (const double value_A : {defocus.u_A, defocus.v_A})
+      if (!kUsual_A.find(value_A)) return value_A;
+    return std::nullopt;
+  };
   std::size_t count = 0, first = 0;
   for (std::size_t i = 0; i < table.views.size(); ++i) {
-    const auto& defocus = table.views[i];
-    if (!defocus || !sections.tilt_deg[i] || (defocus->u_A + defocus->v_A) / 2 >= kLeast_A)
-      continue;
+    if (!table.views[i] || !sections.tilt_deg[i] || !unusual(*table.views[i])) continue;
     if (count++ == 0) first = i;
   }
   if (count == 0) return;
-  const io::Defocus& defocus = *table.views[first];
   base::log_warning(fmt::format(
-      "'{}' has a defocus of {:.4g} Å in section {}, and less than {:.0f} Å in {} of its sections: "
-      "is it under focus, and in the right unit? (--ctf none goes on without it)",
-      table.file.string(), (defocus.u_A + defocus.v_A) / 2, first + 1, kLeast_A, count));
+      "{} has a defocus of {:.4g} Å in section {}, and {} of its sections one outside {:g} to {:g} "
+      "Å: is it under focus, and in the right unit? (--ctf none goes on without it)",
+      table.file.empty() ? "--defocus" : fmt::format("'{}'", table.file.string()),
+      *unusual(*table.views[first]), first + 1, count, kUsual_A.low(), kUsual_A.high()));
 }
 
 // Returns the contrast transfer of each section, or nothing without any.
@@ -144,12 +148,13 @@ std::optional<io::CtfTable> find_ctf(const SeriesFiles& files, const ViewOptions
     table.views.assign(static_cast<std::size_t>(sections.count),
                        io::Defocus{defocus_A, defocus_A, 0.0, 0.0});
     base::log_info(fmt::format("ctf: an underfocus of {} µm in all views", *um));
+    warn_of_unusual_defocus(sections, table);
     return table;
   }
   if (!has_ctf_file(files)) return std::nullopt;
   io::CtfTable table = io::read_ctf(*files.ctf);
   match_sections(sections, table);
-  warn_of_small_defocus(sections, table);
+  warn_of_unusual_defocus(sections, table);
   for (const std::string& what : table.not_applied)
     base::log_warning(fmt::format("'{}' has {}, which is not applied", table.file.string(), what));
   base::log_info(fmt::format("ctf: the defocus of each view from '{}'; --ctf none turns it off",
@@ -172,6 +177,16 @@ void warn_of_voltages(double used_kV, const io::CtfTable& ctf) {
       "'{}' has the defocus for a voltage of {} kV, and {} kV count: give the right one with "
       "--voltage",
       ctf.file.string(), *ctf.optics.voltage_kV, used_kV));
+}
+
+// Says so if a file states another number of the microscope than the one that counts.
+void warn_of_other_optics(const io::CtfTable& ctf, const std::optional<double>& stated, double used,
+                          std::string_view what, std::string_view option) {
+  constexpr double kRounding = 0.001;
+  if (!stated || std::fabs(*stated - used) <= kRounding * std::max(used, 1.0)) return;
+  base::log_warning(
+      fmt::format("'{}' has the defocus for {} of {}, and {} counts: give the right one with {}",
+                  ctf.file.string(), what, *stated, used, option));
 }
 
 // Says so if the defocus was measured with another pixel size, which makes it wrong by the square.
@@ -218,6 +233,10 @@ microscope::Optics find_optics(const SeriesFiles& files, const ViewOptions& opti
   choose(optics.spherical_aberration_mm, options.spherical_aberration_mm,
          stated.spherical_aberration_mm);
   choose(optics.amplitude_contrast, options.amplitude_contrast, stated.amplitude_contrast);
+  warn_of_other_optics(*ctf, stated.spherical_aberration_mm, optics.spherical_aberration_mm,
+                       "a spherical aberration in mm", "--cs");
+  warn_of_other_optics(*ctf, stated.amplitude_contrast, optics.amplitude_contrast,
+                       "an amplitude contrast", "--amplitude-contrast");
   return optics;
 }
 
@@ -259,7 +278,7 @@ Recording recording_of_mdoc(const std::filesystem::path& path, bool of_view) {
     }
     return found;
   }
-  microscope::MdocExposures doses = microscope::exposures_of(mdoc);
+  microscope::StatedExposures doses = microscope::exposures_of(mdoc);
   if (!doses.fault.empty()) {
     base::log_warning(
         fmt::format("'{}': {}, so its doses are not used ({})", path.string(), doses.fault,
@@ -268,17 +287,29 @@ Recording recording_of_mdoc(const std::filesystem::path& path, bool of_view) {
                                                    "order of recording, leave the .mdoc out "
                                                    "and give --dose-per-tilt"));
   }
-  found.doses = std::move(doses.of_section);
+  found.doses = std::move(doses.of_view);
   return found;
 }
 
+// Returns the exposures that a file states. Warns if they are not known, and --dose-per-tilt
+// (`of_view`) does not replace them.
+std::optional<Exposures> known_exposures(microscope::StatedExposures stated,
+                                         const std::filesystem::path& file, bool of_view) {
+  if (!stated.fault.empty() && !of_view)
+    base::log_warning(
+        fmt::format("'{}': {}, so its doses are not used (--dose-per-tilt gives a dose)",
+                    file.string(), stated.fault));
+  return std::move(stated.of_view);
+}
+
 // Reads the doses and the order of recording of a list of tilts, if it has them.
-std::optional<Recording> recording_of_tilts(const std::filesystem::path& path) {
+std::optional<Recording> recording_of_tilts(const std::filesystem::path& path, bool of_view) {
   const io::TiltTable table = io::read_tilt_table(path);
   if (table.order.empty()) return std::nullopt;
   Recording found{path, {}, table.order, {}};
   for (const io::NumberLine& angle : table.angles) found.tilt_deg.emplace_back(angle.value);
-  if (!table.doses.empty()) found.doses = microscope::exposures_in_order(table.order, table.doses);
+  if (!table.doses.empty())
+    found.doses = known_exposures(microscope::exposures_of(table), path, of_view);
   return found;
 }
 
@@ -286,10 +317,11 @@ std::optional<Recording> find_recording(const SeriesFiles& files, const Sections
                                         bool of_view) {
   if (files.mdoc) return recording_of_mdoc(*files.mdoc, of_view);
   if (!sections.input.images && io::is_view_table(files.stack)) {
-    const auto doses = microscope::exposures_of(io::read_view_table(files.stack));
+    const auto doses = known_exposures(microscope::exposures_of(io::read_view_table(files.stack)),
+                                       io::without_half(files.stack), of_view);
     if (doses) return Recording{files.stack, doses, order_of(*doses), {}};
   }
-  if (files.tlt) return recording_of_tilts(*files.tlt);
+  if (files.tlt) return recording_of_tilts(*files.tlt, of_view);
   return std::nullopt;
 }
 

@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
+#include <map>
 #include <numeric>
+#include <string_view>
 #include <utility>
 
 namespace tomofield::microscope {
@@ -28,6 +31,19 @@ double smallest_step(std::vector<double> values) {
     if (difference > 0.0 && (step == 0.0 || difference < step)) step = difference;
   }
   return step;
+}
+
+// Says which two views have the same exposure before them; nothing if all differ that have one.
+std::string equal_ones(const std::vector<std::optional<double>>& before, std::string_view views) {
+  std::map<double, std::size_t> view_of;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (!before[i]) continue;
+    const auto [first, is_new] = view_of.emplace(*before[i], i);
+    if (!is_new)
+      return fmt::format("{} {} and {} have the same dose before them, {:g}", views,
+                         first->second + 1, i + 1, *before[i]);
+  }
+  return "";
 }
 
 // Returns the exposures from those before each view, or nothing if one is missing or negative, or
@@ -148,7 +164,7 @@ bool contradicts_prior_doses(std::span<const std::size_t> order, const io::Mdoc&
   return false;
 }
 
-MdocExposures exposures_of(const io::Mdoc& mdoc) {
+StatedExposures exposures_of(const io::Mdoc& mdoc) {
   const Sections no_prior = sections_without(mdoc, &io::MdocSection::prior_dose);
   const Sections no_dose = sections_without(mdoc, &io::MdocSection::dose);
   std::vector<std::optional<double>> before;
@@ -156,6 +172,9 @@ MdocExposures exposures_of(const io::Mdoc& mdoc) {
   if (auto exposures = exposures_from(before)) {
     if (std::string fault = contradiction_of(mdoc, no_dose.empty()); !fault.empty())
       return {std::nullopt, std::move(fault)};
+    if (no_dose.size() == mdoc.sections.size())
+      if (std::string fault = equal_ones(before, "sections"); !fault.empty())
+        return {std::nullopt, std::move(fault)};
     for (std::size_t i = 0; no_dose.empty() && i < exposures->size(); ++i)
       (*exposures)[i].of_view = *mdoc.sections[i].dose;
     return {std::move(exposures), {}};
@@ -184,10 +203,25 @@ MdocExposures exposures_of(const io::Mdoc& mdoc) {
   return {};
 }
 
-std::optional<std::vector<Exposure>> exposures_of(const io::ViewTable& table) {
-  std::vector<std::optional<double>> before;
-  for (const io::ListedView& view : table.views) before.push_back(view.dose_before);
-  return exposures_from(before);
+StatedExposures exposures_of(const io::ViewTable& table) {
+  std::vector<std::optional<double>> before, used;
+  for (const io::ListedView& view : table.views) {
+    before.push_back(view.dose_before);
+    used.push_back(view.is_used ? view.dose_before : std::nullopt);
+  }
+  auto exposures = exposures_from(before);
+  if (!exposures) return {};
+  if (std::string fault = equal_ones(used, "rows"); !fault.empty())
+    return {std::nullopt, std::move(fault)};
+  return {std::move(exposures)};
+}
+
+StatedExposures exposures_of(const io::TiltTable& table) {
+  const auto none = std::ranges::find(table.doses, 0.0);
+  if (std::ranges::all_of(table.doses, [](double dose) { return dose == 0.0; })) return {};
+  if (none == table.doses.end()) return {exposures_in_order(table.order, table.doses)};
+  return {std::nullopt,
+          fmt::format("row {} has a dose of 0", std::distance(table.doses.begin(), none) + 1)};
 }
 
 }  // namespace tomofield::microscope

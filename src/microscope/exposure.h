@@ -38,25 +38,30 @@ std::vector<Exposure> exposures_in_order(std::span<const std::size_t> order, dou
 std::vector<Exposure> exposures_in_order(std::span<const std::size_t> order,
                                          std::span<const double> doses);
 
-/// The exposure of each section of an .mdoc, or why it is not known.
-struct MdocExposures {
-  std::optional<std::vector<Exposure>> of_section;
-  std::string
-      fault;  ///< a phrase that names what is missing; empty if the file has no doses at all
+/// The exposure of each view that a file states, or why it is not known.
+struct StatedExposures {
+  std::optional<std::vector<Exposure>> of_view;  ///< [section] or [row]
+  /// A phrase that names what is missing or cannot be; empty if the file has no doses at all.
+  std::string fault = {};
 };
 
 /// Returns the exposures from PriorRecordDose if all sections have it and it is not 0 in all of
 /// them, else from ExposureDose and the order of acquisition (io::acquisition_order()). They are
 /// not known if these contradict a PriorRecordDose that some sections have, or if some have no
 /// ExposureDose. SerialEM writes 0 if it does not know the dose.
-MdocExposures exposures_of(const io::Mdoc& mdoc);
+StatedExposures exposures_of(const io::Mdoc& mdoc);
 
 /// Returns true if an order of recording contradicts the PriorRecordDose of sections that have it.
 bool contradicts_prior_doses(std::span<const std::size_t> order, const io::Mdoc& mdoc);
 
-/// Returns the exposure of each view of a table of RELION or Warp, or nothing if it has none, or if
-/// it is 0 in all views. The exposure of a view itself is the smallest difference between two
-/// views, because the tables do not have it.
-std::optional<std::vector<Exposure>> exposures_of(const io::ViewTable& table);
+/// Returns the exposures of the views of a table of RELION or Warp; none if it has none, or if they
+/// are 0 in all views. The exposure of a view itself is the smallest difference between two views,
+/// because the tables do not have it. They are not known if two views that are used have the same
+/// one before them, because each adds to it.
+StatedExposures exposures_of(const io::ViewTable& table);
+
+/// Returns the exposures of a list of tilts with doses; none if they are 0 in all views. They are
+/// not known if a view alone has none.
+StatedExposures exposures_of(const io::TiltTable& table);
 
 }  // namespace tomofield::microscope

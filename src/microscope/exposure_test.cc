@@ -49,7 +49,7 @@ std::string mdoc_text(const std::array<std::string, 3>& entries) {
 
 std::optional<std::vector<Exposure>> exposures_of_text(const std::array<std::string, 3>& entries) {
   const ScratchDirectory directory;
-  return exposures_of(io::read_mdoc(directory.write("a.mdoc", mdoc_text(entries)))).of_section;
+  return exposures_of(io::read_mdoc(directory.write("a.mdoc", mdoc_text(entries)))).of_view;
 }
 
 TEST(ExposuresOfMdoc, AddUpTheDoses) {
@@ -86,7 +86,7 @@ TEST(ExposuresOfMdoc, AreUnknownIfSerialEmDoesNotKnowThem) {
 }
 
 // Returns the exposures of an .mdoc of sections without times.
-MdocExposures without_times(const std::vector<std::string>& entries) {
+StatedExposures without_times(const std::vector<std::string>& entries) {
   const ScratchDirectory directory;
   std::string text;
   for (std::size_t i = 0; i < entries.size(); ++i)
@@ -115,31 +115,31 @@ TEST(ExposuresOfMdoc, AreNotThoseOfAPriorDoseThatIsContradicted) {
 
 TEST(ExposuresOfMdoc, NeverContradictAPriorDoseThatIsKnown) {
   // The order by numbers is not that of recording.
-  const MdocExposures unordered =
+  const StatedExposures unordered =
       without_times({"ExposureDose = 8", "ExposureDose = 8\nPriorRecordDose = 56",
                      "ExposureDose = 8\nPriorRecordDose = 0", "ExposureDose = 8"});
-  EXPECT_FALSE(unordered.of_section);
+  EXPECT_FALSE(unordered.of_view);
   EXPECT_EQ(unordered.fault,
             "PriorRecordDose is missing in sections 1, 4, and nothing else tells the order of "
             "recording");
   // It is, and the prior doses agree with it.
-  const MdocExposures ordered = without_times(
+  const StatedExposures ordered = without_times(
       {"ExposureDose = 2", "ExposureDose = 2\nPriorRecordDose = 2.1", "ExposureDose = 2"});
-  ASSERT_TRUE(ordered.of_section);
-  EXPECT_EQ((*ordered.of_section)[2].before, 4.0);
+  ASSERT_TRUE(ordered.of_view);
+  EXPECT_EQ((*ordered.of_view)[2].before, 4.0);
   // Times tell an order that the prior doses contradict.
-  const MdocExposures timed =
+  const StatedExposures timed =
       without_times({"ExposureDose = 2\nDateTime = 12-Mar-21 10:00:00\nPriorRecordDose = 9",
                      "ExposureDose = 2\nDateTime = 12-Mar-21 10:01:00"});
-  EXPECT_FALSE(timed.of_section);
+  EXPECT_FALSE(timed.of_view);
   EXPECT_NE(timed.fault.find("contradict"), std::string::npos);
 }
 
 TEST(ExposuresOfMdoc, AreUnknownIfTimesGiveNoOrder) {
   const std::string dose = "ExposureDose = 3\n", time = "DateTime = 12-Mar-21 10:00:0";
   const auto fault = [&](const std::vector<std::string>& entries) {
-    const MdocExposures found = without_times(entries);
-    EXPECT_FALSE(found.of_section);
+    const StatedExposures found = without_times(entries);
+    EXPECT_FALSE(found.of_view);
     return found.fault;
   };
   EXPECT_EQ(fault({dose + time + "2", dose + "DateTime = 12/03/21 10:00"}),
@@ -152,10 +152,10 @@ TEST(ExposuresOfMdoc, AreUnknownIfTimesGiveNoOrder) {
       "[ZValue = 0] and [ZValue = 2] have the same DateTime, and nothing else tells the order "
       "of recording");
   // Doses before the sections tell the order as well.
-  const MdocExposures told = without_times(
+  const StatedExposures told = without_times(
       {dose + "PriorRecordDose = 3\nDateTime = x", dose + "PriorRecordDose = 0\nDateTime = y"});
-  ASSERT_TRUE(told.of_section);
-  EXPECT_EQ((*told.of_section)[0].before, 3.0);
+  ASSERT_TRUE(told.of_view);
+  EXPECT_EQ((*told.of_view)[0].before, 3.0);
 }
 
 TEST(ExposuresOfMdoc, SaysWhatIsMissing) {
@@ -184,12 +184,45 @@ TEST(ExposuresOfTable, AreThoseBeforeTheViews) {
     table.views.emplace_back();
     table.views.back().dose_before = dose;
   }
-  const auto exposures = exposures_of(table);
+  const auto exposures = exposures_of(table).of_view;
   ASSERT_TRUE(exposures);
   EXPECT_EQ((*exposures)[0].before, 6.0);
   EXPECT_EQ((*exposures)[0].of_view, 3.0);
   table.views.back().dose_before.reset();
-  EXPECT_FALSE(exposures_of(table));
+  EXPECT_FALSE(exposures_of(table).of_view);
+}
+
+TEST(ExposuresOfTable, CannotBeTheSameBeforeTwoViewsThatAreUsed) {
+  for (const std::array<double, 3>& doses :
+       {std::array{3.0, 3.0, 3.0}, std::array{0.0, 3.0, 3.0}}) {
+    io::ViewTable table;
+    for (const double dose : doses) {
+      table.views.emplace_back();
+      table.views.back().dose_before = dose;
+    }
+    const StatedExposures same = exposures_of(table);
+    EXPECT_FALSE(same.of_view);
+    EXPECT_NE(same.fault.find("rows"), std::string::npos) << same.fault;
+    table.views[1].is_used = false;
+    EXPECT_EQ(exposures_of(table).of_view.has_value(), doses[0] != doses[2]);
+  }
+  io::Mdoc mdoc;
+  for (const double dose : {3.0, 3.0, 6.0}) {
+    mdoc.sections.emplace_back();
+    mdoc.sections.back().prior_dose = dose;
+  }
+  EXPECT_FALSE(exposures_of(mdoc).of_view);
+  EXPECT_NE(exposures_of(mdoc).fault.find("sections 1 and 2"), std::string::npos);
+}
+
+TEST(ExposuresOfTilts, AreNotKnownIfSomeAreZero) {
+  io::TiltTable table{.angles = {{0, 1}, {3, 2}, {-3, 3}}, .order = {0, 1, 2}, .doses = {2, 2, 2}};
+  EXPECT_EQ((*exposures_of(table).of_view)[2].before, 4.0);
+  table.doses[1] = 0;
+  EXPECT_NE(exposures_of(table).fault.find("row 2"), std::string::npos);
+  table.doses = {0, 0, 0};
+  EXPECT_FALSE(exposures_of(table).of_view);
+  EXPECT_EQ(exposures_of(table).fault, "");
 }
 
 }  // namespace

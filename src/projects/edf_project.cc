@@ -26,8 +26,12 @@ Entries read_entries(const fs::path& edf) {
   for (const io::TextLine& line : io::read_text_lines(edf)) {
     const std::size_t equals = line.text.find('=');
     if (line.text.starts_with('#') || equals == std::string::npos) continue;
-    const std::string_view text = line.text;
-    entries[std::string(io::trim(text.substr(0, equals)))] = io::trim(text.substr(equals + 1));
+    const std::string_view text = line.text, value = io::trim(text.substr(equals + 1));
+    const auto [entry, is_new] = entries.emplace(io::trim(text.substr(0, equals)), value);
+    if (!is_new && entry->second != value)
+      throw Error(fmt::format("'{}', line {}: {} comes twice, as '{}' and '{}': leave one out",
+                              edf.string(), line.number, io::quote(entry->first),
+                              io::quote(entry->second), io::quote(value)));
   }
   return entries;
 }
@@ -88,8 +92,14 @@ void set_pixel_size(Project& project, const fs::path& edf, const Entries& entrie
                     const fs::path& stack) {
   constexpr const char* kEntry = "Setup.PixelSize";
   constexpr double kAngstroms_in_nm = 10.0;
-  const auto size_nm = io::parse_number(value_of(entries, kEntry));
-  if (size_nm && *size_nm > 0)
+  const std::string text = value_of(entries, kEntry);
+  if (text.empty() || project.ignores(kEntry)) return;
+  const auto size_nm = io::parse_number(text);
+  if (!size_nm)
+    throw Error(fmt::format(
+        "'{}': {} is '{}', which is no size of a pixel: correct it, or go on with --ignore {}",
+        edf.string(), kEntry, io::quote(text), kEntry));
+  if (*size_nm > 0)
     set_stated_pixel_size(project, {edf, kEntry, kAngstroms_in_nm * *size_nm},
                           io::open_image_stack(stack)->header().voxel_size_A[0]);
 }

@@ -210,10 +210,10 @@ void set_excluded(Project& project, CommandEntries& tilt, std::int64_t num_secti
 }
 
 void set_intensities(Project& project, CommandEntries& tilt) {
-  const auto base = tilt.number("LOG");
-  if (!base) return;
+  if (!tilt.text("LOG")) return;
+  const double base = tilt.number("LOG").value_or(0.0);  // "LOG /" stands for 0
   project.set("--log", "true", tilt.file(), "LOG");
-  if (*base != 0) project.set("--log-base", fmt::format("{}", *base), tilt.file(), "LOG");
+  if (base != 0) project.set("--log-base", fmt::format("{}", base), tilt.file(), "LOG");
 }
 
 }  // namespace

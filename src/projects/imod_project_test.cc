@@ -336,6 +336,8 @@ TEST(ImodProject, OpticsOfTheCommandsAreReadOrRefused) {
   expect_parts(imod.refusal(), {"ctfplotter.com", "line 2", "Voltage is 200", "ctfcorrection.com"});
   imod.folder.write("ctfplotter.com", "$ctfplotter -StandardInput\nVoltage 300\n");
   EXPECT_EQ(imod.refusal(), "");
+  write("SphericalAberration 0.0\nAmplitudeContrast 0\n");  // a corrected microscope has none
+  EXPECT_EQ(imod.refusal(), "");
   for (const char* bad : {"abc", "0", "-3"}) {
     write(std::string("Voltage ") + bad + "\n");
     expect_parts(imod.refusal(), {"ctfcorrection.com", "line 2", "Voltage"});
@@ -356,6 +358,31 @@ TEST(ImodProject, TheDefocusFileOfTheCommandsComesFirst) {
   EXPECT_EQ(imod.warnings({"PhaseShiftInDegrees"}), "");
   std::filesystem::rename(imod.folder / "other.defocus", imod.folder / "TS.defocus");
   EXPECT_EQ(imod.values().at("--ctf"), (imod.folder / "TS.defocus").string());
+}
+
+TEST(ImodProject, EntriesOfTheCorrectionThatAreNotAppliedAreNamed) {
+  const ImodFolder imod;
+  imod.folder.write("TS.defocus", "1 1 0 0 3000 2\n");
+  const auto warnings = [&](const std::string& tilt, const std::string& entry) {
+    imod.write_tilt("THICKNESS 900\n" + tilt);
+    imod.folder.write(
+        "ctfcorrection.com",
+        "$ctfphaseflip -StandardInput\nDefocusFile TS.defocus\nDefocusTol 200\n" + entry + "\n");
+    return imod.warnings();
+  };
+  for (const char* entry : {"OffsetInZ 400", "XAxisTilt 30", "PhasePlateShift 1"})
+    expect_parts(warnings("", entry), {"ctfcorrection.com", "line 4", "is not applied"});
+  for (const auto& [tilt, entry] :
+       {std::pair("XAXISTILT 2.5\n", "XAxisTilt 2.5"), {"", "OffsetInZ 0"}, {"", "UseGPU 0"}})
+    EXPECT_EQ(warnings(tilt, entry).find("not applied"), std::string::npos) << entry;
+}
+
+TEST(ImodProject, TheLogarithmNeedsANumberOrASlash) {
+  const ImodFolder imod;
+  imod.write_tilt("THICKNESS 900\nLOG /\n");
+  EXPECT_EQ(imod.values().at("--log"), "true");
+  imod.write_tilt("THICKNESS 900\nLOG\n");
+  expect_parts(imod.refusal(), {"tilt.com", "LOG", "value"});
 }
 
 // The size is in nm: ctfphaseflip's is that of binned pixels of the aligned stack.

@@ -43,18 +43,35 @@ const io::RelionTomogram& choose_tomogram(const std::vector<io::RelionTomogram>&
                                 request.path.string(), request.series, names_of(tomograms)));
 }
 
+// Sets the hand of the defocus, which the table of the views states or the row that names it.
+void set_hand(Project& project, const io::ViewTable& views, const io::RelionTomogram& row,
+              const fs::path& star) {
+  constexpr const char* kEntry = "rlnTomoHand";
+  if (views.defocus_hand && row.defocus_hand && *views.defocus_hand != *row.defocus_hand &&
+      !project.ignores(kEntry))
+    throw Error(fmt::format(
+        "'{}', tomogram {}: _{} is another than in '{}': correct one of them, or go on with "
+        "--ignore {}",
+        star.string(), row.name, kEntry, views.file.string(), kEntry));
+  const auto& hand = row.defocus_hand ? row.defocus_hand : views.defocus_hand;
+  if (hand)
+    project.set("--defocus-hand", fmt::format("{}", *hand), row.defocus_hand ? star : views.file,
+                kEntry);
+}
+
 // Sets what a table of one tilt series says, and tells whether it has the defocus of its views.
 bool set_views(Project& project, const fs::path& views, const fs::path& named_by,
-               std::string_view entry, const std::string& row) {
+               std::string_view entry, const io::RelionTomogram& row) {
   const io::ViewTable table = io::read_view_table(views);
   for (const io::ImageInFile& image : io::find_view_images(table)) project.add_file(image.file);
-  project.set("stack", views.string(), named_by, entry, row);
-  const bool has_defocus = io::has_defocus(table);
-  if (has_defocus)
-    project.set("--ctf", views.string(), views, "rlnDefocusU");
-  else
+  project.set("stack", views.string(), named_by, entry, row.name);
+  if (!io::has_defocus(table)) {
     warn_of_unused_transfer(project, table);
-  return has_defocus;
+    return false;
+  }
+  project.set("--ctf", views.string(), views, "rlnDefocusU");
+  set_hand(project, table, row, named_by);
+  return true;
 }
 
 // Sets what the row of a tomogram says of the microscope.
@@ -66,14 +83,6 @@ void set_optics(Project& project, const io::RelionTomogram& tomogram, const fs::
   set("--voltage", "rlnVoltage", tomogram.optics.voltage_kV);
   set("--cs", "rlnSphericalAberration", tomogram.optics.spherical_aberration_mm);
   set("--amplitude-contrast", "rlnAmplitudeContrast", tomogram.optics.amplitude_contrast);
-  // RELION adds rlnTomoHand · z to the defocus, and z falls to the right at a positive tilt.
-  if (!tomogram.hand) return;
-  if (*tomogram.hand != 1.0 && *tomogram.hand != -1.0) {
-    throw Error(
-        fmt::format("'{}', tomogram {}: _rlnTomoHand is {}, and a hand is 1 or -1: correct it",
-                    star.string(), tomogram.name, *tomogram.hand));
-  }
-  project.set("--defocus-hand", *tomogram.hand < 0.0 ? "1" : "-1", star, "rlnTomoHand");
 }
 
 // Notes the table of a tomogram, which results must not replace.
@@ -120,10 +129,12 @@ void read_relion_project(Project& project) {
   const io::RelionTomogram& tomogram = choose_tomogram(tomograms, project.request());
   const fs::path views = io::find_listed_file(tomogram.tilt_series_star, star);
   for (const io::RelionTomogram& other : tomograms) add_table_of(project, other, star);
-  const bool has_transfer =
-      set_views(project, views, star, "rlnTomoTiltSeriesStarFile", tomogram.name);
+  const bool has_transfer = set_views(project, views, star, "rlnTomoTiltSeriesStarFile", tomogram);
   if (has_transfer) set_optics(project, tomogram, star);
   if (has_transfer || project.request().has_transfer) set_detector(project, tomogram, star);
+  for (const std::string& what : tomogram.not_applied)
+    project.warn(fmt::format("'{}', tomogram {}: {}, which is not applied", star.string(),
+                             tomogram.name, what));
   if (tomogram.defocus_slope.value_or(1.0) != 1.0)
     project.warn(
         fmt::format("'{}', tomogram {}: _rlnTomoDefocusSlope {} is not applied: the "

@@ -66,10 +66,11 @@ bool set_transfer_file(Project& project, const fs::path& file, const fs::path& n
 // A command file with its entries; none if it is not there.
 struct CtfCommand {
   fs::path file;
+  bool is_fit;  // ctfplotter's
   std::vector<io::CommandEntry> entries;
 
-  CtfCommand(const fs::path& tilt_com, const char* name)
-      : file(command_file_beside(tilt_com, name)) {
+  CtfCommand(const fs::path& tilt_com, const char* name, bool fits)
+      : file(command_file_beside(tilt_com, name)), is_fit(fits) {
     if (!io::is_file(file)) return;
     for (io::Command& command : io::read_command_file(file))
       entries.insert(entries.end(), command.entries.begin(), command.entries.end());
@@ -81,7 +82,7 @@ struct CtfCommands {
   CtfCommand correction, plotter;
 
   explicit CtfCommands(const fs::path& tilt_com)
-      : correction(tilt_com, "ctfcorrection"), plotter(tilt_com, "ctfplotter") {}
+      : correction(tilt_com, "ctfcorrection", false), plotter(tilt_com, "ctfplotter", true) {}
   std::array<const CtfCommand*, 2> all() const { return {&correction, &plotter}; }
 };
 
@@ -90,18 +91,20 @@ struct NamedTransfer {
   fs::path file, named_in;
 };
 
-// A number above 0 that an entry of a command file states.
+// A number above 0, or of 0 or more, that an entry of a command file states.
 struct StatedNumber {
   fs::path file;
   std::string entry;
   int line;
   double value;
 
-  static StatedNumber of(const fs::path& file, const io::CommandEntry& entry) {
+  static StatedNumber of(const fs::path& file, const io::CommandEntry& entry, bool may_be_0) {
     const auto number = io::parse_number(entry.value);
-    if (number && *number > 0) return {file, entry.name, entry.line, *number};
-    throw Error(fmt::format("'{}', line {}: '{} {}' is not a number above 0: correct it",
-                            file.string(), entry.line, entry.name, io::quote(entry.value)));
+    if (number && (*number > 0 || (may_be_0 && *number == 0)))
+      return {file, entry.name, entry.line, *number};
+    throw Error(fmt::format("'{}', line {}: '{} {}' is not a number {}: correct it", file.string(),
+                            entry.line, entry.name, io::quote(entry.value),
+                            may_be_0 ? "of 0 or more" : "above 0"));
   }
 
   // Throws Error if another entry contradicts this one.
@@ -116,11 +119,11 @@ struct StatedNumber {
 
 // Returns the number of an entry in a file, if it has it. Throws Error if it has two.
 std::optional<StatedNumber> find_stated(Project& project, const CtfCommand& command,
-                                        std::string_view name) {
+                                        std::string_view name, bool may_be_0 = false) {
   std::optional<StatedNumber> found;
   for (const io::CommandEntry& entry : command.entries) {
     if (lower_case(entry.name) != name || project.ignores(entry.name)) continue;
-    const StatedNumber stated = StatedNumber::of(command.file, entry);
+    const StatedNumber stated = StatedNumber::of(command.file, entry, may_be_0);
     if (found && found->value != stated.value) stated.refuse_other(*found);
     found = stated;
   }
@@ -139,7 +142,7 @@ void set_microscope(Project& project, const CtfCommands& commands, bool has_tran
   for (const Optics& optics : kOptics) {
     std::optional<StatedNumber> found;
     for (const CtfCommand* command : commands.all()) {
-      const auto stated = find_stated(project, *command, optics.entry);
+      const auto stated = find_stated(project, *command, optics.entry, optics.is_of_transfer);
       if (!stated) continue;
       if (found && found->value != stated->value) stated->refuse_other(*found);
       if (!found && (has_transfer || !optics.is_of_transfer))
@@ -196,15 +199,48 @@ void compare_axis(Project& project, const CtfCommand& command) {
   }
 }
 
+// Entries of ctfphaseflip that are used here, or that change the cost of its correction, its files
+// or its strength alone. All others change the contrast transfer, or are not known.
+constexpr std::array<std::string_view, 26> kKnownOfCorrection{
+    "inputstack",          "outputfilename",
+    "anglefile",           "defocusfile",
+    "transformfile",       "voltage",
+    "sphericalaberration", "amplitudecontrast",
+    "pixelsize",           "unbinnedpixelsize",
+    "axisangle",           "defocustol",
+    "interpolationwidth",  "maximumstripwidth",
+    "minimumstripwidth",   "usegpu",
+    "actionifgpufails",    "scalebyctfpower",
+    "scalebypower",        "attenuationfactor",
+    "attenuationpower",    "startingendingviews",
+    "totalviews",          "boundaryinfo",
+    "parameterfile",       "correctwholeimages"};
+// Entries of ctfplotter that change the contrast transfer. Its others are of the fit, whose result
+// is the .defocus file.
+constexpr std::array<std::string_view, 4> kOthersOfFit{"phaseshiftindegrees", "phaseplateshift",
+                                                       "cutonfrequency", "inverttiltangles"};
+
+template <std::size_t kCount>
+bool is_one_of(const std::array<std::string_view, kCount>& names, std::string_view name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+// Returns the tilt about X that the project has set, or 0.
+double x_axis_tilt(const Project& project) {
+  const auto set = std::ranges::find(project.settings(), "--x-axis-tilt", &Setting::option);
+  return set == project.settings().end() ? 0.0 : double{io::parse_number(set->value).value()};
+}
+
 // Warns of what changes the contrast transfer and is not applied. The phase shifts that count are
 // those of the .defocus file.
 void warn_of_other_transfer(Project& project, const CtfCommand& command) {
-  constexpr std::array<std::string_view, 4> kOthers{"phaseshiftindegrees", "phaseplateshift",
-                                                    "cutonfrequency", "inverttiltangles"};
   for (const io::CommandEntry& entry : command.entries) {
-    if (std::ranges::find(kOthers, lower_case(entry.name)) == kOthers.end()) continue;
+    const std::string name = lower_case(entry.name);
+    if (command.is_fit ? !is_one_of(kOthersOfFit, name) : is_one_of(kKnownOfCorrection, name))
+      continue;
     const auto number = io::parse_number(entry.value);
     if ((number && *number == 0.0) || project.ignores(entry.name)) continue;
+    if (name == "xaxistilt" && number && *number == x_axis_tilt(project)) continue;
     project.warn(fmt::format(
         "'{}', line {}: {} is not applied (--ignore {} says that this is meant)",
         command.file.string(), entry.line, io::quote(entry.name), io::quote(entry.name)));
@@ -233,7 +269,7 @@ void set_imod_optics(Project& project, const fs::path& tilt_com, const StackPixe
   const CtfCommands commands(tilt_com);
   set_microscope(project, commands, has_transfer);
   set_imod_pixel_size(project, commands, pixels);
-  compare_axis(project, commands.plotter);
+  for (const CtfCommand* command : commands.all()) compare_axis(project, *command);
   if (!has_transfer) return;
   for (const CtfCommand* command : commands.all()) warn_of_other_transfer(project, *command);
 }

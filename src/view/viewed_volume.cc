@@ -10,7 +10,8 @@ namespace tomofield::view {
 
 namespace {
 
-constexpr std::int64_t kPointsAtOnce = 4 << 20;  // between two looks at the stop
+// Points between two looks at the stop: 0.1 to 0.2 s of the largest ranks.
+constexpr std::int64_t kPointsAtOnce = 1 << 19;
 
 // A rectangle of pixels of a plane.
 struct Pixels {

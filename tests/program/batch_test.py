@@ -588,6 +588,35 @@ def test_its_configuration_is_an_input(data):
         config.unlink()
 
 
+def test_the_file_of_a_config_cell_sets_what_a_column_may_set(data):
+    """A trace of one series would replace the stack of another."""
+    folder = pathlib.Path(harness.fresh_directory("config_cells"))
+    for name in ("a.mrc", "a.tlt"):
+        shutil.copy(os.path.join(data, name), folder)
+    table = write_table(folder / "t.csv", [["stack", "tlt", "config"],
+                                           [folder / "a.mrc", folder / "a.tlt", folder / "c.toml"]])
+    for line in ("trace = 't.csv'", "plan = 'a.tlt'", "grid = 'a.tlt'", "overwrite = true",
+                 "dry-run = true", "output = 'z.mrc'"):
+        (folder / "c.toml").write_text(line, encoding="utf-8")
+        before = harness.contents(folder)
+        said = harness.tomofield("batch", table, *QUICK, "-o", folder / "results", cwd=folder)
+        assert said.returncode == 2, said
+        for fact in ("line 2 of", f"'{line.split()[0]}'", "c.toml", "set by the batch"):
+            assert fact in said.stderr, (fact, said.stderr)
+        assert harness.contents(folder) == before
+    (folder / "c.toml").write_text("tv = 5\n", encoding="utf-8")
+    harness.succeed("batch", table, *QUICK, "-o", folder / "results", "--dry-run")
+
+
+def test_a_name_like_an_option_gives_no_advice_on_files(data):
+    folder = harness.fresh_directory("named_overwrite")
+    table = write_table(os.path.join(folder, "t.csv"),
+                        [["stack", "tlt"], [os.path.join(data, "a.mrc"), "my--overwrite.tlt"]])
+    said = harness.tomofield("batch", table, *QUICK, "-o", folder)
+    assert said.returncode == 2 and "my--overwrite.tlt" in said.stderr, said
+    assert "remove" not in said.stderr, said.stderr
+
+
 @pytest.mark.parametrize("name", ["summary.csv", "index.html"])
 def test_a_folder_in_the_place_of_its_own_file_is_found_first(data, name):
     folder = harness.fresh_directory("folders")

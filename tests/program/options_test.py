@@ -127,6 +127,19 @@ def test_a_file_says_what_the_command_line_says():
     assert harness.read_bytes(configured.volume_path) == harness.read_bytes(written.volume_path)
 
 
+def test_an_option_of_a_file_needs_a_value(tmp_path):
+    """The command line would take the next word for it."""
+    series = harness.Series("unvalued")
+    for line in ('trace = ""', "trace = []", 'exclude = ""', 'roi = ""', 'center = ["", "3"]'):
+        (tmp_path / "a.toml").write_text(f"{line}\ntv = 5\n", encoding="utf-8")
+        ended = harness.tomofield("reconstruct", *series.input, "--config", tmp_path / "a.toml",
+                                  "-o", tmp_path / "o.mrc", cwd=tmp_path)
+        assert ended.returncode == 2, ended
+        for fact in ("a.toml", "line 1", line.split()[0], "has no value"):
+            assert fact in ended.stderr, (fact, ended.stderr)
+        assert not [name for name in os.listdir(tmp_path) if name.startswith(("-", "o."))]
+
+
 def test_what_follows_two_dashes_is_a_file():
     series = harness.Series("dashed")
     folder = harness.fresh_directory("dashes")

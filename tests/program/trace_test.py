@@ -131,6 +131,16 @@ def test_file_that_cannot_be_written_is_refused_before_any_work(series):
     assert harness.read_bytes(existing) == b"mine"
 
 
+def test_no_two_files_beside_the_results_are_one(series):
+    folder = harness.fresh_directory("one_file")
+    one, output = (os.path.join(folder, name) for name in ("one.json", "out.mrc"))
+    for options in (["--choice", one, "--trace", one], ["--plan", one, "--trace", one],
+                    ["--dry-run", "--grid", one, "--plan", one]):
+        run = harness.tomofield("reconstruct", *series.input, *harness.QUICK, "-o", output, *options)
+        assert run.returncode == 2 and "two results would both be" in run.stderr, run
+        assert not os.listdir(folder)
+
+
 def test_overwrite_replaces_a_trace(series):
     path = os.path.join(harness.fresh_directory("replaced"), "trace.json")
     pathlib.Path(path).write_text("old")

@@ -1,5 +1,6 @@
 #include "measurement/view_transfers.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include "scratch_directory.h"
 #include "simulate/simulate_series.h"
 #include "tomofield/error.h"
+#include "warning_catcher.h"
 
 namespace tomofield::measurement {
 namespace {
@@ -141,6 +143,29 @@ TEST(ViewTransfers, AreRefusedWithoutWhatTheyNeed) {
   options.views.defocus_um = 4.0;
   expect_parts(message_of<Error>([&] { transfers_of(files, options); }),
                {"plain/tilt_series.mrc", "pixel size", "--pixel-size"});
+}
+
+TEST(ViewTransfers, OpticsThatContradictOrCannotBeAreWarnedOf) {
+  const ScratchDirectory folder;
+  simulate::simulate_series(folder / "s", simulation(), false);
+  SeriesFiles files = files_in(folder);
+  const auto warnings = [&](const Options& options) {
+    const testing::WarningCatcher caught;
+    transfers_of(files, options);
+    return caught.text();
+  };
+  Options options = options_of_run();
+  options.views.defocus_um = 3e-6;  // metres, say
+  expect_parts(warnings(options), {"--defocus", "right unit"});
+  options.views.defocus_um.reset();
+  files.ctf = folder / "s/tilt_series_ctf.txt";
+  EXPECT_EQ(warnings(options), "");
+  options.views.spherical_aberration_mm = 0.01;
+  options.views.amplitude_contrast = 0.5;
+  expect_parts(warnings(options), {"spherical aberration", "--cs", "--amplitude-contrast"});
+  options = options_of_run();
+  files.ctf = folder.write("a.defocus", "1 0 0. 0. 0 3\n1 5 0 0 0.3 2900 0\n");
+  expect_parts(warnings(options), {"a.defocus", "right unit", "5 of its sections"});
 }
 
 TEST(ViewTransfers, ContradictionsAreFaults) {

@@ -23,6 +23,7 @@
 #include "batch/task.h"
 #include "cli/commands/commands.h"
 #include "cli/options/common_options.h"
+#include "cli/options/config_file.h"
 #include "cli/options/help_formatter.h"
 #include "cli/options/number_checks.h"
 #include "cli/options/project_options.h"
@@ -57,8 +58,9 @@ struct BatchArguments {
 
 // Says what a table may do with an option of reconstruct.
 batch::ColumnKind kind_of_column(const CLI::App& reconstruct, const std::string& flag) {
-  for (const char* own : {"--output", "--overwrite", "--resume", "--threads", "--dry-run", "--plan",
-                          "--choice", "--batch-choice", "--trace", "--help", "--help-all"})
+  for (const char* own :
+       {"--output", "--overwrite", "--resume", "--threads", "--dry-run", "--plan", "--choice",
+        "--batch-choice", "--trace", "--grid", "--help", "--help-all"})
     if (flag == own) return batch::ColumnKind::kNotHere;
   const CLI::Option* option = reconstruct.get_option_no_throw(flag);
   if (option == nullptr) return batch::ColumnKind::kUnknown;
@@ -77,6 +79,22 @@ batch::KnownColumns known_columns(const CLI::App& reconstruct) {
   return known;
 }
 
+// Adds the options to `faults` that the file of a cell `config` sets, and that no table may set.
+void check_config(const batch::Series& series, const batch::KnownColumns& known,
+                  base::Faults& faults) {
+  for (const option_table::GivenOption& option : series.options) {
+    if (option.flag != "--config" || !option.value) continue;
+    try {
+      for (const std::string& name : names_in_config_file(*option.value))
+        if (known.kind_of("--" + name) == batch::ColumnKind::kNotHere)
+          faults.add(fmt::format("{}: '{}' in '{}' is set by the batch: leave it out of the file",
+                                 series.source, name, *option.value));
+    } catch (const Error& error) {
+      faults.add(fmt::format("{}: {}", series.source, error.what()));
+    }
+  }
+}
+
 // Reads which series there are. Adds the mistakes of a table to `faults`.
 std::vector<batch::Series> read_series(const CLI::App& program, const std::string& list,
                                        base::Faults& faults) {
@@ -84,7 +102,10 @@ std::vector<batch::Series> read_series(const CLI::App& program, const std::strin
   const std::string ending = is_pattern ? "" : fs::path(list).extension().string();
   if (ending == ".star") return batch::read_star(list);
   if (ending != ".csv" && ending != ".tsv") return batch::expand_pattern(list);
-  return batch::read_table(list, known_columns(*program.get_subcommand("reconstruct")), faults);
+  const batch::KnownColumns known = known_columns(*program.get_subcommand("reconstruct"));
+  std::vector<batch::Series> all = batch::read_table(list, known, faults);
+  for (const batch::Series& series : all) check_config(series, known, faults);
+  return all;
 }
 
 // Returns the threads that all jobs share, or those of a task of a job array.

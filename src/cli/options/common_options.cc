@@ -44,12 +44,12 @@ std::vector<option_table::GivenOption> given_options(const CLI::App& command,
 void check_extra_files(std::initializer_list<ExtraFile> files,
                        const std::vector<std::filesystem::path>& results, const SeriesFiles& input,
                        const RunOptions& run) {
+  std::vector<std::filesystem::path> all = results;
   for (const auto& [file, flag] : files) {
     if (!file) continue;
     io::check_output_files({*file}, io::input_files(input), run.overwrite,
                            fmt::format("give another name with {}{}", flag,
                                        run.resume ? "" : ", or --overwrite to replace it"));
-    std::vector<std::filesystem::path> all = results;
     all.push_back(*file);
     io::require_distinct(all);
   }

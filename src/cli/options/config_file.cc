@@ -120,18 +120,26 @@ class Entry {
     if (array == nullptr) return {"--" + name_ + "=" + text_of(node_)};  // also for "-60:60:2"
     std::vector<std::string> words;
     for (const toml::node& element : *array) words.push_back(text_of(element));
+    if (words.empty()) fail_without_value();
     // The list becomes one word, like --roi's. Other options refuse such a word themselves.
     if (most_values == 1) return {fmt::format("--{}={}", name_, fmt::join(words, ","))};
     if (words.size() > static_cast<std::size_t>(most_values))
       fail(fmt::format("takes at most {} values, not {}", most_values, words.size()));
+    for (const std::string& word : words)
+      if (word.starts_with('-') && !io::parse_number(word))
+        fail(fmt::format("has a value '{}', which would be an option", io::quote(word)));
     words.insert(words.begin(), "--" + name_);
     return words;
   }
 
  private:
+  // The command line would take the next word for the value.
+  [[noreturn]] void fail_without_value() const { fail("has no value: give one, or leave it out"); }
+
   std::string text_of(const toml::node& node) const {
     if (const auto text = node.value_exact<std::string>()) {
       if (text->find('\0') != std::string::npos) fail("has a character NUL, which no value has");
+      if (text->empty()) fail_without_value();
       return decoded(*text);
     }
     if (const auto integer = node.value_exact<std::int64_t>()) return fmt::format("{}", *integer);
@@ -164,6 +172,12 @@ void expand_config_file(const CLI::App& program, std::vector<std::string>& argum
     const std::vector<std::string> words = entry.arguments(option->get_items_expected_max());
     arguments.insert(end_of_options(arguments), words.begin(), words.end());
   }
+}
+
+std::vector<std::string> names_in_config_file(const std::string& path) {
+  std::vector<std::string> names;
+  for (const auto& [key, node] : read_toml(path)) names.push_back(decoded(std::string(key.str())));
+  return names;
 }
 
 }  // namespace tomofield::cli

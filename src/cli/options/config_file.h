@@ -12,4 +12,8 @@ namespace tomofield::cli {
 /// cannot be read and for keys that the subcommand does not know.
 void expand_config_file(const CLI::App& program, std::vector<std::string>& arguments);
 
+/// Returns the names of the options that a file of --config sets. Throws Error for a file that
+/// cannot be read.
+std::vector<std::string> names_in_config_file(const std::string& path);
+
 }  // namespace tomofield::cli

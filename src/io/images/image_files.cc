@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "io/images/image_stack.h"
+#include "io/saving/file_identity.h"
 #include "io/tables/alignment_files.h"
 #include "tomofield/error.h"
 
@@ -16,6 +17,7 @@ namespace {
 class FilesStack : public ImageStack {
  public:
   FilesStack(const std::vector<ImageInFile>& images, std::string name) : name_(std::move(name)) {
+    require_distinct(images);
     std::map<std::filesystem::path, std::shared_ptr<const ImageStack>> opened;
     for (const ImageInFile& image : images) {
       std::shared_ptr<const ImageStack>& stack = opened[image.file];
@@ -39,6 +41,21 @@ class FilesStack : public ImageStack {
     std::shared_ptr<const ImageStack> stack;
     std::int64_t index;
   };
+
+  // Throws Error if two views are one image, also by two names of its file.
+  void require_distinct(const std::vector<ImageInFile>& images) const {
+    std::map<std::pair<FileIdentity, std::int64_t>, std::size_t> view_of;
+    for (std::size_t view = 0; view < images.size(); ++view) {
+      const ImageInFile& image = images[view];
+      const std::int64_t section = image.section.value_or(0);
+      const auto [first, is_new] =
+          view_of.emplace(std::pair(identity_of(image.file), section), view);
+      if (!is_new)
+        throw Error(fmt::format("{}: views {} and {} are the same image, {} of '{}': leave one out",
+                                name_, first->second + 1, view + 1, section + 1,
+                                image.file.string()));
+    }
+  }
 
   // Takes sizes from the first file, and throws Error if an image has others or is not there.
   void require_fits(const ImageInFile& image, const MrcHeader& found) {

@@ -65,6 +65,22 @@ TEST(ViewImages, WhoseTiltAxesDifferSaySo) {
   expect_parts(difference("12"), {"a tilt axis in degrees of 12 in", "b.mrc", "85.3"});
 }
 
+TEST(ViewImages, AreNotTheSameOneForTwoViews) {
+  const ScratchDirectory scratch;
+  stack(scratch / "d/s.mrc", 3, 1.0f);
+  std::filesystem::create_symlink("s.mrc", scratch / "d/link.mrc");
+  const std::filesystem::path file = scratch / "d/s.mrc";
+  const auto refusal = [&](const ImageInFile& second) {
+    return message_of<Error>([&] {
+      image_stack_of_files({{.file = file, .section = 1}, second}, "the images");
+    });
+  };
+  EXPECT_EQ(refusal({.file = file, .section = 2}), "");
+  for (const char* spelling : {"d/s.mrc", "d/../d/s.mrc", "d/./s.mrc", "d/link.mrc"})
+    expect_parts(refusal({.file = scratch / spelling, .section = 1}),
+                 {"the images", "views 1 and 2", "same image"});
+}
+
 TEST(ViewImages, MayBeSectionsOfAStack) {
   const ScratchDirectory scratch;
   stack(scratch / "s.mrc", 3, 2.0f);

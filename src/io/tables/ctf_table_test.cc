@@ -253,7 +253,30 @@ TEST(CtfTable, UnitsAndLimitsOfTheMicroscopeAreRefused) {
                {"line 2", "acceleration voltage", "200", "300"});
   expect_parts(refusal("amplitude contrast: 7"), {"amplitude contrast", "7"});
   expect_parts(refusal("Columns: #2 - defocus 1 [nm]"), {"line 1", "defocus 1", "[nm]"});
-  expect_parts(refusal("#5 - additional phase shift [degrees]"), {"line 1", "[degrees]"});
+  for (const char* column :
+       {"#5 - additional phase shift [degrees]", "#5 - additional phase shift (degrees)",
+        "#2 - defocus 1 (nm); #3 - defocus 2", "#2 - defocus 1 in um", "#3 - defocus 2 [nm]",
+        "#4 - azimuth of astigmatism [radians]; #5 - additional phase shift [radians]"})
+    expect_parts(refusal(column), {"line 1", "the column", "correct it"});
+  for (const char* column : {"#2 - defocus 1 [Å]; #3 - defocus 2 (in Angstroms)",
+                             "#4 - azimuth of astigmatism; #5 - additional phase shift [radian]"})
+    EXPECT_EQ(refusal(column), "");
+  EXPECT_EQ(refusal("Number of micrographs: 4"), "");
+  expect_parts(refusal("Number of micrographs: 0"), {"0 micrographs", "number 1"});
+}
+
+TEST(CtfTable, DirectionsAndPhasesOfImodBeyondATurnAreRefused) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::string& flags, const std::string& columns) {
+    return message_of<Error>([&] {
+      read_ctf(scratch.write("a.defocus", flags + " 0 0. 0. 0 3\n1 1 0 0 3000 " + columns + "\n"));
+    });
+  };
+  EXPECT_EQ(refusal("5", "2900 350 90"), "");
+  EXPECT_EQ(refusal("15", "2900 3 1.5"), "");
+  for (const auto& [flags, columns] :
+       {std::pair("1", "2900 9999"), {"5", "2900 20 9999"}, {"13", "2900 20 90"}})
+    expect_parts(refusal(flags, columns), {"line 2", "cannot be", "flags"});
 }
 
 TEST(CtfTable, ADefocusOfImodThatComesTwiceIsRefused) {

@@ -41,18 +41,23 @@ std::optional<double> number_after(const std::filesystem::path& path, const Text
                           path.string(), line.number, key, words[1], unit));
 }
 
-// Throws Error if a comment states another unit of a column than the one that is read:
-// "#2 - defocus 1 [Angstroms]", "#5 - additional phase shift [radians]".
+// Throws Error if a comment states another unit of a column than the one that is read, or another
+// meaning: "#2 - defocus 1 [Angstroms]; #3 - defocus 2", "#5 - additional phase shift [radians]".
 void require_unit(const std::filesystem::path& path, const TextLine& line, std::string_view column,
                   std::string_view letters) {
-  const std::string_view text = line.text;
+  std::string_view text = line.text;
   const std::size_t at = text.find(column);
   if (at == std::string_view::npos) return;
-  const std::string_view rest = trim(text.substr(at + column.size()));
-  if (!rest.starts_with('[') || rest.substr(1).starts_with(letters)) return;
-  throw Error(fmt::format(
-      "'{}', line {}: the column '{}' is in {}, and CTFFIND writes [{}…]: correct it",
-      path.string(), line.number, column, quote(rest.substr(0, rest.find(']') + 1)), letters));
+  text.remove_prefix(at + column.size());
+  const std::string_view stated = trim(text.substr(0, text.find_first_of(";,#")));
+  std::string_view unit = stated;
+  unit.remove_prefix(std::min(unit.find_first_not_of("[( "), unit.size()));
+  if (unit.starts_with("in ")) unit.remove_prefix(3);
+  if (stated.empty() || unit.starts_with(letters) || (letters == "A" && unit.starts_with("Å")))
+    return;
+  throw Error(
+      fmt::format("'{}', line {}: the column '{}' is {}, and CTFFIND writes [{}…]: correct it",
+                  path.string(), line.number, column, quote(stated), letters));
 }
 
 void read_comment(const std::filesystem::path& path, const TextLine& line, StatedOptics& optics) {
@@ -65,6 +70,8 @@ void read_comment(const std::filesystem::path& path, const TextLine& line, State
     value = number;
   };
   require_unit(path, line, "defocus 1", "A");
+  require_unit(path, line, "defocus 2", "A");
+  require_unit(path, line, "azimuth of astigmatism", "deg");
   require_unit(path, line, "phase shift", "rad");
   take("Pixel size:", "Angstroms", optics.pixel_size_A);
   take("acceleration voltage:", "keV", optics.voltage_kV);
@@ -107,10 +114,13 @@ Row parse_row(const std::filesystem::path& path, const TextLine& line) {
 CtfTable read_ctffind(const std::filesystem::path& path) {
   CtfTable table{path, {}, {}, {}};
   table.is_of_aretomo = true;
+  std::optional<double> stated_count;
   for (const TextLine& line : read_text_lines(path)) {
     if (line.text.starts_with('#')) {
       if (line.text.find("CTFFind") != std::string::npos) table.is_of_aretomo = false;
       read_comment(path, line, table.optics);
+      if (const auto number = number_after(path, line, "Number of micrographs:", ""))
+        stated_count = number;
       continue;
     }
     const Row row = parse_row(path, line);
@@ -122,6 +132,11 @@ CtfTable read_ctffind(const std::filesystem::path& path) {
     }
     table.views[section] = row.defocus;
   }
+  if (stated_count && *stated_count < static_cast<double>(table.views.size()))
+    throw Error(
+        fmt::format("'{}' states {} micrographs and has a row of number {}: give the whole "
+                    "table of one series, or correct the number",
+                    path.string(), *stated_count, table.views.size()));
   return table;
 }
 

@@ -123,6 +123,12 @@ Entry parse_entry(const std::filesystem::path& path, const TextLine& line, const
     const double phase = std::abs(values[has_astigmatism ? 7 : 5]);  // as IMOD does
     defocus.phase_shift_deg = form.has(kPhaseInRadians) ? phase / kRadians : phase;
   }
+  for (const double angle_deg : {defocus.angle_deg, defocus.phase_shift_deg})
+    if (!base::is_plausible(angle_deg, base::kLargestAngle_deg))
+      throw Error(fmt::format(
+          "'{}', line {}: a direction or phase shift of {:g}° cannot be: correct it, or the flags "
+          "{} of the first line, which say what is in radians",
+          path.string(), line.number, angle_deg, form.flags));
   const double sign = form.has(kAnglesInverted) ? -1.0 : 1.0;
   for (const std::size_t i : {2, 3})
     if (!base::is_plausible(values[i], base::kLargestAngle_deg))

@@ -18,6 +18,10 @@
 namespace tomofield::io {
 namespace {
 
+// The part of the file that a line is in. Lines below a head of another kind, such as
+// [MontSection = 0], are not of the section before.
+enum class Part { kHead, kSection, kOther };
+
 struct KeyValue {
   std::string_view key, value;
 };
@@ -95,6 +99,23 @@ void note_other_axis(const StatedAxes& axes, Mdoc& mdoc) {
                     by_entry.tilt_axis_deg->value, axes.entry->line));
 }
 
+// Notes if SerialEM's title and a RotationAngle state two axes. The angle is 90° more than the
+// axis, up to half turns.
+void note_other_rotation(const StatedAxes& axes, Mdoc& mdoc) {
+  constexpr double kSame_deg = 10.0;
+  for (const auto& rotation : {axes.rotation, axes.other_rotation}) {
+    if (!axes.serialem || !rotation) continue;
+    const double rest_deg = std::remainder(rotation->value - 90.0 - axes.serialem->value, 180.0);
+    if (std::fabs(rest_deg) <= kSame_deg) continue;
+    mdoc.differences.push_back(
+        fmt::format("a tilt axis of {}° in line {}, which is taken, and a RotationAngle of {}° in "
+                    "line {}, which belongs to one of {}°: give the right one with --tilt-axis",
+                    axes.serialem->value, axes.serialem->line, rotation->value, rotation->line,
+                    rotation->value - 90.0));
+    return;
+  }
+}
+
 // Sets the axis of the first of the angles there are.
 void choose_axis(const std::filesystem::path& path, const StatedAxes& axes, Mdoc& mdoc) {
   if (axes.serialem) {
@@ -109,6 +130,7 @@ void choose_axis(const std::filesystem::path& path, const StatedAxes& axes, Mdoc
     mdoc.lone_rotation_deg = axes.rotation;
   }
   note_other_axis(axes, mdoc);
+  note_other_rotation(axes, mdoc);
 }
 
 constexpr double kLargestDefocus_um = 1000;
@@ -136,13 +158,18 @@ double require_spacing_A(const std::filesystem::path& path, const TextLine& line
                   base::kPixelSizes_A.high()));
 }
 
-// Reads two whole numbers, as of ImageSize.
+// Reads two whole numbers, as of ImageSize. A point and zeros may follow them.
 std::optional<std::array<std::int64_t, 2>> parse_size(std::string_view text) {
+  constexpr double kMostPixels = 1e6;  // along a side
   const auto words = split_words(text);
   if (words.size() != 2) return std::nullopt;
-  const auto width = parse_integer(words[0]), height = parse_integer(words[1]);
-  if (!width || !height || *width < 1 || *height < 1) return std::nullopt;
-  return std::array{*width, *height};
+  const auto width = parse_number(words[0], kMostPixels),
+             height = parse_number(words[1], kMostPixels);
+  const auto is_size = [](const auto& side) {
+    return side && *side >= 1.0 && *side == std::floor(*side);
+  };
+  if (!is_size(width) || !is_size(height)) return std::nullopt;
+  return std::array{static_cast<std::int64_t>(*width), static_cast<std::int64_t>(*height)};
 }
 
 // Returns n of "[ZValue = n]", and nothing for other heads such as "[T = …]" and
@@ -249,7 +276,7 @@ void read_rotation(const std::filesystem::path& path, const TextLine& line, cons
     axes.other_rotation = stated;
 }
 
-// Notes where sections state images of another magnification or binning than the first one's.
+// Notes where a section states another magnification or binning of its image than a line before.
 class Magnifications {
  public:
   void read(const TextLine& line, const KeyValue& entry, Mdoc& mdoc) {
@@ -270,19 +297,21 @@ class Magnifications {
   bool is_noted_ = false;
 };
 
-// The entries of a section that have been read: a second one must say the same.
+// The entries of a section, or of the head, that have been read: a second one must say the same.
 class EntriesOfSection {
  public:
-  void require_new(const std::filesystem::path& path, const TextLine& line, const KeyValue& entry) {
-    constexpr std::array<std::string_view, 8> kRead{
-        "TiltAngle",     "PriorRecordDose", "ExposureDose", "DateTime",
-        "RotationAngle", "TargetDefocus",   "SubFramePath", "PixelSpacing"};
+  void require_new(const std::filesystem::path& path, const TextLine& line, const KeyValue& entry,
+                   Part part) {
+    constexpr std::array<std::string_view, 10> kRead{
+        "TiltAngle",     "PriorRecordDose", "ExposureDose", "DateTime",  "RotationAngle",
+        "TargetDefocus", "SubFramePath",    "PixelSpacing", "ImageFile", "ImageSize"};
     if (std::ranges::find(kRead, entry.key) == kRead.end()) return;
     const auto [other, is_new] = values_.emplace(entry.key, entry.value);
     if (!is_new && other->second != entry.value)
-      throw Error(fmt::format("'{}', line {}: {} comes twice in its section, as '{}' and '{}'",
-                              path.string(), line.number, entry.key, quote(other->second),
-                              quote(entry.value)));
+      throw Error(fmt::format("'{}', line {}: {} comes twice {}, as '{}' and '{}'", path.string(),
+                              line.number, entry.key,
+                              part == Part::kHead ? "above the sections" : "in its section",
+                              quote(other->second), quote(entry.value)));
   }
 
  private:
@@ -323,11 +352,16 @@ void require_same(const std::filesystem::path& path, const TextLine& line, std::
 }
 
 // Sets what an entry above all sections says.
-void read_head_entry(const KeyValue& entry, Mdoc& mdoc) {
+void read_head_entry(const TextLine& line, const KeyValue& entry, Mdoc& mdoc) {
   if (entry.key == "ImageFile") {
     mdoc.image_file = without_folders(entry.value);
   } else if (entry.key == "ImageSize") {
     mdoc.image_size_px = parse_size(entry.value);
+    if (!mdoc.image_size_px)
+      mdoc.differences.push_back(fmt::format(
+          "ImageSize = {} in line {}, which is no width and height in pixels, so nothing "
+          "tells of which images PixelSpacing is: give the size with --pixel-size",
+          quote(entry.value), line.number));
   } else if (entry.key == "Montage") {
     mdoc.is_montage = entry.value != "0";
   }
@@ -379,8 +413,7 @@ void require_no_pieces(const std::filesystem::path& path, const Mdoc& mdoc) {
 Mdoc read_mdoc(const std::filesystem::path& path) {
   Mdoc mdoc;
   StatedAxes axes;
-  // Lines below a head of another kind, such as [MontSection = 0], are not of the section before.
-  enum class Part { kHead, kSection, kOther } part = Part::kHead;
+  Part part = Part::kHead;
   EntriesOfSection entries;
   Magnifications magnifications;
   for (const TextLine& line : read_text_lines(path)) {
@@ -403,15 +436,13 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
     if (entry.value.empty()) continue;  // Leginon writes entries without a value
     if (entry.key == "RotationAngle") read_rotation(path, line, entry, axes);
     if (part == Part::kOther) continue;
-    if (part == Part::kSection) {
-      entries.require_new(path, line, entry);
-      magnifications.read(line, entry, mdoc);
-    }
+    entries.require_new(path, line, entry, part);
+    magnifications.read(line, entry, mdoc);
     if (read_common_entry(path, line, entry, axes, mdoc)) continue;
     if (part == Part::kSection)
       read_section_entry(path, line, entry, &mdoc.sections.back());
     else
-      read_head_entry(entry, mdoc);
+      read_head_entry(line, entry, mdoc);
   }
   if (mdoc.sections.empty()) {
     throw Error(fmt::format("'{}' has no sections, [ZValue = 0] and so on: is it an .mdoc file?",

@@ -245,6 +245,44 @@ TEST(Mdoc, EntriesThatContradictEachOtherAreRefused) {
       {"a.mdoc", "line 6", "PixelSpacing", "20", "10"});
 }
 
+TEST(Mdoc, TheSizeOfImagesIsReadOrNoted) {
+  const ScratchDirectory scratch;
+  const auto with_head = [&](const std::string& head) {
+    return read_mdoc(scratch.write("a.mdoc", head + "\n[ZValue = 0]\nTiltAngle = 1\n"));
+  };
+  for (const char* size : {"96 48", "96.0 48.0"}) {
+    const Mdoc mdoc = with_head(std::string("ImageSize = ") + size);
+    EXPECT_EQ(mdoc.image_size_px, (std::array<std::int64_t, 2>{96, 48}));
+    EXPECT_TRUE(mdoc.differences.empty());
+  }
+  for (const char* size : {"96x48", "96 48 16", "96.5 48", "0 48"}) {
+    const Mdoc mdoc = with_head(std::string("ImageSize = ") + size);
+    ASSERT_EQ(mdoc.differences.size(), 1u) << size;
+    expect_parts(mdoc.differences[0], {"ImageSize", size, "line 1", "--pixel-size"});
+  }
+  expect_parts(message_of<Error>([&] { with_head("ImageSize = 96 96\nImageSize = 48 48"); }),
+               {"a.mdoc", "line 2", "ImageSize", "twice"});
+}
+
+TEST(Mdoc, NotesARotationAngleThatContradictsTheTitle) {
+  const ScratchDirectory scratch;
+  const auto differences = [&](const std::string& axis, const std::string& rotation) {
+    return read_mdoc(scratch.write("a.mdoc", "[T = Tilt axis angle = " + axis +
+                                                 ", binning = 1]\n[ZValue = 0]\nTiltAngle = 1\n"
+                                                 "RotationAngle = 175\n[ZValue = 1]\n"
+                                                 "TiltAngle = 4\nRotationAngle = " +
+                                                 rotation + "\n"))
+        .differences;
+  };
+  EXPECT_TRUE(differences("85.3", "175").empty());
+  EXPECT_TRUE(differences("-95.2", "175.4").empty());
+  for (const auto& [axis, rotation] : {std::pair("0.0", "175"), {"85.3", "30"}}) {
+    const auto found = differences(axis, rotation);
+    ASSERT_EQ(found.size(), 1u) << axis;
+    expect_parts(found[0], {"line 1", "RotationAngle", "--tilt-axis"});
+  }
+}
+
 TEST(Mdoc, EntriesWithoutAValueStateNothing) {
   const ScratchDirectory scratch;
   const Mdoc mdoc = read_mdoc(scratch.write("a.mdoc",

@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
+#include <optional>
+#include <span>
 
 #include "io/tables/ctf_table.h"
 #include "io/tables/text_lines.h"
@@ -61,7 +65,8 @@ std::optional<Defocus> defocus_of(const StarRow& row, const StarTable& table) {
 template <typename Find>
 std::optional<double> pixel_size_by(const Find& find) {
   constexpr double kAngstroms_in_um = 1e4;
-  if (const auto size_A = find("rlnMicrographPixelSize")) return size_A;
+  for (const char* column : {"rlnMicrographPixelSize", "rlnTomoTiltSeriesPixelSize"})
+    if (const auto size_A = find(column)) return size_A;
   const auto detector_um = find("rlnDetectorPixelSize"), magnification = find("rlnMagnification");
   if (!detector_um || !magnification || !(*magnification > 0.0)) return std::nullopt;
   return kAngstroms_in_um * *detector_um / *magnification;
@@ -127,6 +132,16 @@ StatedOptics optics_of(const std::filesystem::path& path, const std::vector<Star
   return optics_by([&](const char* column) { return only_number(path, tables, column); });
 }
 
+// Returns the hand of the defocus as a view table has it. RELION adds rlnTomoHand · z to the
+// defocus, and z falls to the right at a positive tilt.
+std::optional<int> defocus_hand_of(const std::optional<double>& relion_hand,
+                                   const std::string& where) {
+  if (!relion_hand) return std::nullopt;
+  if (*relion_hand == 1.0 || *relion_hand == -1.0) return *relion_hand < 0.0 ? 1 : -1;
+  throw Error(fmt::format("{}: _rlnTomoHand is {}, and a hand is 1 or -1: correct it", where,
+                          *relion_hand));
+}
+
 ListedView view_of(const StarRow& row, const StarTable& table, bool is_nominal) {
   ListedView view;
   view.image = row.text("rlnMicrographName");
@@ -149,29 +164,56 @@ ListedView view_of(const StarRow& row, const StarTable& table, bool is_nominal) 
   return view;
 }
 
-// Notes what a table has and a rigid alignment cannot honour, and the first defocus that is left
-// out of it.
-void note_what_is_left_out(const StarTable& table, ViewTable& views) {
-  const auto has_digits = [](const std::string& text) {
-    return text.find_first_of("123456789") != std::string::npos;
-  };
-  const auto is_scaled = [](const std::string& text) {
-    const auto number = parse_number(text);
-    return number && *number != 1.0;
-  };
-  const auto note = [&](const char* column, const char* what, const auto& is_set) {
-    for (std::size_t i = 0; table.has_column(column) && i < table.num_rows(); ++i) {
-      if (!is_set(table.find(i, column).value_or(""))) continue;
-      return views.not_applied.push_back(fmt::format("{} (_{})", what, column));
-    }
-  };
-  note("rlnTomoDeformationCoefficients", "deformations of the views", has_digits);
-  for (const char* column : {"rlnMagMat00", "rlnMagMat11"})
-    note(column, "a magnification matrix", is_scaled);
-  for (const char* column : {"rlnMagMat01", "rlnMagMat10"})
-    note(column, "a magnification matrix", has_digits);
-  for (const char* column : {"rlnBeamTiltX", "rlnBeamTiltY", "rlnOddZernike", "rlnEvenZernike"})
-    note(column, "aberrations beside the defocus", has_digits);
+// Tells whether an entry states something other than zeros, such as a number or "nan".
+bool is_not_zero(const std::string& text) {
+  return text != "None" && std::ranges::any_of(text, [](unsigned char c) {
+           return (c >= '1' && c <= '9') || (std::isalpha(c) != 0 && c != 'e' && c != 'E');
+         });
+}
+
+bool is_not_one(const std::string& text) {
+  const auto number = parse_number(text);
+  return number ? *number != 1.0 : is_not_zero(text);
+}
+
+// An optical distortion that a column of RELION states, and that is not applied.
+struct Distortion {
+  const char* column;
+  const char* what;
+  bool (*is_set)(const std::string& text);
+};
+
+// Returns the distortions that some rows of tables state, for messages. With `row`, that row alone
+// counts.
+std::vector<std::string> distortions_of(std::span<const StarTable> tables,
+                                        std::optional<std::size_t> row = std::nullopt) {
+  constexpr std::array<Distortion, 9> kDistortions{
+      {{"rlnTomoDeformationCoefficients", "deformations of the views", is_not_zero},
+       {"rlnMagMat00", "a magnification matrix", is_not_one},
+       {"rlnMagMat11", "a magnification matrix", is_not_one},
+       {"rlnMagMat01", "a magnification matrix", is_not_zero},
+       {"rlnMagMat10", "a magnification matrix", is_not_zero},
+       {"rlnBeamTiltX", "aberrations beside the defocus", is_not_zero},
+       {"rlnBeamTiltY", "aberrations beside the defocus", is_not_zero},
+       {"rlnOddZernike", "aberrations beside the defocus", is_not_zero},
+       {"rlnEvenZernike", "aberrations beside the defocus", is_not_zero}}};
+  std::vector<std::string> found;
+  for (const Distortion& distortion : kDistortions) {
+    const auto states = [&](const StarTable& table) {
+      if (!table.has_column(distortion.column)) return false;
+      for (std::size_t i = 0; i < table.num_rows(); ++i)
+        if ((!row || *row == i) && distortion.is_set(*table.find(i, distortion.column)))
+          return true;
+      return false;
+    };
+    if (std::ranges::any_of(tables, states))
+      found.push_back(fmt::format("{} (_{})", distortion.what, distortion.column));
+  }
+  return found;
+}
+
+// Notes the first defocus that is left out of a table.
+void note_missing_defocus(const StarTable& table, ViewTable& views) {
   if (!table.has_column("rlnDefocusU")) return;
   const auto gap = std::ranges::find_if(
       views.views, [](const ListedView& view) { return !view.defocus.has_value(); });
@@ -217,12 +259,13 @@ RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
     tomogram.name = row.text("rlnTomoName");
     tomogram.tilt_series_star = row.text("rlnTomoTiltSeriesStarFile");
     tomogram.pixel_size_A = row.find_number("rlnTomoTiltSeriesPixelSize");
-    tomogram.hand = row.find_number("rlnTomoHand");
+    const std::string where = fmt::format("'{}', tomogram {}", path.string(), quote(tomogram.name));
+    tomogram.defocus_hand = defocus_hand_of(row.find_number("rlnTomoHand"), where);
     tomogram.defocus_slope = row.find_number("rlnTomoDefocusSlope");
     tomogram.optics = optics_by([&](const char* column) { return row.find_number(column); });
     tomogram.mtf = row.find_text("rlnMtfFileName").value_or("");
-    tomogram.size_px =
-        size_of(row, fmt::format("'{}', tomogram {}", path.string(), quote(tomogram.name)));
+    tomogram.not_applied = distortions_of({table, 1}, i);
+    tomogram.size_px = size_of(row, where);
     all.tomograms.push_back(std::move(tomogram));
   }
   if (all.tomograms.empty())
@@ -262,7 +305,10 @@ ViewTable read_relion_views(const std::filesystem::path& path) {
   views.optics = optics_of(path, tables);
   for (std::size_t i = 0; i < table.num_rows(); ++i)
     views.views.push_back(view_of(StarRow(path, table, i), table, is_nominal));
-  note_what_is_left_out(table, views);
+  views.not_applied = distortions_of(tables);
+  views.defocus_hand =
+      defocus_hand_of(only_number(path, tables, "rlnTomoHand"), fmt::format("'{}'", path.string()));
+  note_missing_defocus(table, views);
   return views;
 }
 
@@ -275,7 +321,7 @@ CtfTable read_relion_ctf(const std::filesystem::path& path) {
         "job 'CTF estimation' or a later one wrote",
         path.string()));
   }
-  CtfTable ctf{path, {}, optics_of(path, tables), {}};
+  CtfTable ctf{path, {}, optics_of(path, tables), distortions_of(tables)};
   for (std::size_t i = 0; i < table->num_rows(); ++i) {
     const StarRow row(path, *table, i);
     ctf.views.push_back(defocus_of(row, *table));

@@ -17,11 +17,12 @@ struct RelionTomogram {
   std::string name;
   std::string tilt_series_star;  ///< as it is written, from RELION's project folder
   std::optional<double> pixel_size_A;
-  std::optional<double> hand;  ///< of the defocus across a tilted view, not of the geometry
+  std::optional<int> defocus_hand;      ///< as in a ViewTable
   std::optional<double> defocus_slope;  ///< of the same with the height; 1: as it is
   StatedOptics optics;
   std::string mtf;  ///< the file of the detector's transfer function, or empty
   std::optional<std::array<std::int64_t, 3>> size_px;  ///< unbinned
+  std::vector<std::string> not_applied;  ///< distortions that its row states, for messages
 };
 
 /// A tomograms.star, or a STAR file of tilt series that has the same table without volumes.

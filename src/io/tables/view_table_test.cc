@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "expect_parts.h"
+#include "io/tables/ctf_table.h"
 #include "io/tables/relion_star.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -93,7 +94,7 @@ TEST(RelionTomograms, AreReadWithTheirColumns) {
   EXPECT_EQ(all.tomograms[0].name, "TS_01");
   EXPECT_EQ(all.tomograms[0].tilt_series_star, "t/TS_01.star");
   EXPECT_EQ(all.tomograms[0].pixel_size_A, 2.39);
-  EXPECT_EQ(all.tomograms[0].hand, -1.0);
+  EXPECT_EQ(all.tomograms[0].defocus_hand, 1);
   EXPECT_EQ(all.tomograms[0].optics.amplitude_contrast, 0.1);
   EXPECT_EQ(all.tomograms[0].optics.voltage_kV, std::nullopt);
   EXPECT_EQ(all.tomograms[0].size_px, (std::array<std::int64_t, 3>{4092, 4000, 1392}));
@@ -176,14 +177,31 @@ TEST(ViewTable, OpticsOfRelionThatAreNotAppliedAreNoted) {
                                  column + " #6\na.mrc 0 0 0 0 " + value + "\n"))
         .not_applied;
   };
-  for (const auto& [column, neutral, other] : {std::tuple("rlnMagMat00", "1.0", "1.02"),
-                                               {"rlnMagMat01", "0.0", "0.01"},
-                                               {"rlnBeamTiltX", "0", "-0.3"},
-                                               {"rlnOddZernike", "[0,0]", "[0,0.2]"}}) {
+  for (const auto& [column, neutral, other] :
+       {std::tuple("rlnMagMat00", "1.0", "1.02"),
+        {"rlnMagMat01", "0.0", "0.01"},
+        {"rlnBeamTiltX", "0", "-0.3"},
+        {"rlnMagMat00", "1", "nan"},
+        {"rlnMagMat10", "0e0", "abc"},
+        {"rlnBeamTiltY", "None", "nan"},
+        {"rlnTomoDeformationCoefficients", "[0,0]", "[nan,nan]"},
+        {"rlnOddZernike", "[0,0]", "[0,0.2]"}}) {
     EXPECT_TRUE(noted(column, neutral).empty()) << column;
     ASSERT_EQ(noted(column, other).size(), 1u) << column;
     expect_parts(noted(column, other)[0], {column});
   }
+  // The row of a tomogram, and a table of the contrast transfer alone, may state them, too.
+  const auto tomograms = scratch.write(
+      "tomograms.star",
+      "data_global\nloop_\n_rlnTomoName #1\n_rlnTomoTiltSeriesStarFile #2\n_rlnMagMat00 #3\n"
+      "TS_01 a.star 1\nTS_02 b.star 2\n");
+  const RelionTomograms all = read_relion_tomograms(tomograms);
+  EXPECT_TRUE(all.tomograms[0].not_applied.empty());
+  ASSERT_EQ(all.tomograms[1].not_applied.size(), 1u);
+  const auto ctf = read_ctf(
+      scratch.write("ctf.star", "data_t\nloop_\n_rlnDefocusU #1\n_rlnBeamTiltX #2\n30000 0.5\n"));
+  ASSERT_EQ(ctf.not_applied.size(), 1u);
+  expect_parts(ctf.not_applied[0], {"rlnBeamTiltX"});
 }
 
 TEST(ViewTable, TablesOfOtherJobsOfRelionAreNamed) {
@@ -444,6 +462,48 @@ TEST(ViewTable, NamesImagesThatAreStretchedOrListedTwice) {
   const std::string row = "a.mrc None 0 4 0 0 0 0 3e4 3e4 0 0\n";
   expect_parts(refusal_of_views(scratch.write("a.star", kRelionHead + row + row)),
                {"a.star", "a.mrc", "two views"});
+}
+
+TEST(ViewTable, RefusesXmlThatStatesSomethingTwice) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::string& from, const std::string& to) {
+    std::string xml = kSeriesXml + "</TiltSeries>";
+    xml.replace(xml.find(from), from.size(), to);
+    return refusal_of_views(scratch.write("TS.xml", xml));
+  };
+  expect_parts(refusal("LevelAngleX=\"0.5\"", "LevelAngleX=\"0.5\" LevelAngleX=\"50\""),
+               {"TS.xml", "LevelAngleX of <TiltSeries>", "twice"});
+  expect_parts(refusal("</TiltSeries>", "</TiltSeries><TiltSeries></TiltSeries>"),
+               {"TS.xml", "<TiltSeries>", "twice"});
+}
+
+TEST(ViewTable, RefusesAnglesOfWarpsDefocusBeyondATurn) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::string& name, const std::string& value) {
+    const std::string nodes = "<Node Value=\"" + value + "\"/>";
+    return refusal_of_views(scratch.write("TS.xml", kSeriesXml +
+                                                        grid("GridCTF", "", "<Node Value=\"3\"/>") +
+                                                        grid(name, "", nodes) + "</TiltSeries>"));
+  };
+  EXPECT_EQ(refusal("GridCTFPhase", "0.5"), "");
+  EXPECT_EQ(refusal("GridCTFDefocusAngle", "170"), "");
+  expect_parts(refusal("GridCTFPhase", "90"), {"TS.xml", "view 1", "16200"});
+  expect_parts(refusal("GridCTFDefocusAngle", "9000"), {"TS.xml", "view 1", "9000"});
+}
+
+TEST(ViewTable, HasTheHandThatRelionsTableOfViewsStates) {
+  const ScratchDirectory scratch;
+  const auto table = [&](const std::string& hand) {
+    return read_view_table(
+        scratch.write("TS.star",
+                      "data_t\nloop_\n_rlnMicrographName #1\n_rlnTomoYTilt #2\n_rlnTomoZRot #3\n"
+                      "_rlnTomoXShiftAngst #4\n_rlnTomoYShiftAngst #5\n_rlnTomoHand #6\n"
+                      "a.mrc 0 0 0 0 " +
+                          hand + "\n"));
+  };
+  EXPECT_EQ(table("-1").defocus_hand, 1);
+  EXPECT_EQ(table("1").defocus_hand, -1);
+  expect_parts(message_of<Error>([&] { table("2"); }), {"TS.star", "rlnTomoHand is 2"});
 }
 
 TEST(ViewTable, RefusesXmlThatIsNoSeries) {

@@ -20,6 +20,19 @@
 namespace tomofield::io {
 namespace {
 
+// Finds an attribute that comes twice in its element. The parser would take the first one.
+struct TwiceStated : pugi::xml_tree_walker {
+  std::string attribute;  // empty: none
+
+  bool for_each(pugi::xml_node& node) override {
+    std::set<std::string_view> names;
+    for (const pugi::xml_attribute& found : node.attributes())
+      if (!names.insert(found.name()).second)
+        attribute = fmt::format("{} of <{}>", found.name(), node.name());
+    return attribute.empty();
+  }
+};
+
 // Warp's XML file of a tilt series. Elements hold one value a line, one line a view.
 class WarpXml {
  public:
@@ -30,7 +43,11 @@ class WarpXml {
       throw Error(fmt::format("'{}' is no XML file, or a damaged one: {} at byte {}", path.string(),
                               result.description(), result.offset));
     }
+    TwiceStated twice;
+    document_.traverse(twice);
+    if (!twice.attribute.empty()) fail_twice(twice.attribute);
     root_ = document_.child("TiltSeries");
+    if (root_.next_sibling("TiltSeries")) fail_twice("<TiltSeries>");
     if (!root_ || !root_.child("Angles")) {
       throw Error(
           fmt::format("'{}' has no <TiltSeries> with <Angles>, so it is no tilt series of "
@@ -309,6 +326,12 @@ void set_defocus(const WarpXml& xml, ViewTable& table) {
   const auto angles_deg = means("GridCTFDefocusAngle", "°");
   if (!means_um || !differences_um || !angles_deg || !phases) return;
   for (std::size_t i = 0; i < table.views.size(); ++i) {
+    for (const double angle_deg : {(*angles_deg)[i], kHalfTurn_deg * (*phases)[i]})
+      if (!base::is_plausible(angle_deg, base::kLargestAngle_deg))
+        throw Error(
+            fmt::format("'{}': the direction of the defocus (in degrees) or the phase shift "
+                        "(in units of π) of view {} stands for {:g}°: correct it",
+                        table.file.string(), i + 1, angle_deg));
     table.views[i].defocus = {kAngstroms_in_um * ((*means_um)[i] + (*differences_um)[i] / 2),
                               kAngstroms_in_um * ((*means_um)[i] - (*differences_um)[i] / 2),
                               (*angles_deg)[i], kHalfTurn_deg * (*phases)[i]};
