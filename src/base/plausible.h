@@ -45,6 +45,9 @@ class Interval {
 
 inline constexpr double kLargestNumber = 1e9;
 inline constexpr double kLargestAngle_deg = 360.0;
+/// Beyond this tilt a ray crosses several times the specimen's thickness and would need an ever
+/// wider margin.
+inline constexpr double kLargestTilt_deg = 80.0;
 inline constexpr double kLargestPosition_px = 1e7;
 inline constexpr Interval kPixelSizes_A{1e-3, 1e7};
 

@@ -53,7 +53,10 @@ bool RunningJob::has_ended() {
                                job_->output.string());
   } else if (was_stopped(result->exit_status)) {
     state.progress = Progress::kStopped;
-    state.reason = base::reason_of_failure(log_of(options_->folder, *job_));
+    const fs::path log = log_of(options_->folder, *job_);
+    state.reason = base::reason_of_failure(log);
+    if (state.reason.empty())  // it ended before it could be asked to stop
+      state.reason = base::reason_of_failure(result->exit_status, log);
   } else {
     state.progress = Progress::kFailed;
     state.reason = base::reason_of_failure(result->exit_status, log_of(options_->folder, *job_));

@@ -11,6 +11,7 @@
 
 #include "base/code_text.h"
 #include "base/plausible.h"
+#include "base/progress.h"
 #include "base/system/child_process.h"
 #include "batch/packing.h"
 #include "batch/state_record.h"
@@ -189,14 +190,16 @@ void require_sbatch() {
   throw Error("sbatch is not there: --slurm needs a machine from which jobs are submitted");
 }
 
-std::string submit(const fs::path& folder, std::optional<int> task, const std::string& after) {
+std::string submit(const fs::path& folder, std::optional<int> task, const std::string& after,
+                   const std::function<bool()>& stop_requested) {
   std::vector<std::string> command{"/usr/bin/env", "sbatch", "--parsable"};
   if (task) command.push_back(fmt::format("--array={}", *task));
   if (!after.empty()) command.push_back("--dependency=afterany:" + after);
   command.push_back(fs::absolute(script_of(folder)).string());
   const fs::path answer = answer_of(folder, task);
-  const base::ChildResult result = base::run_child(command, answer, {});
+  const base::ChildResult result = base::run_child(command, answer, stop_requested);
   const std::string said = answer_in(answer);
+  if (result.exit_status != 0 && stop_requested && stop_requested()) throw base::StopRequested();
   if (result.exit_status == 127)
     throw Error("sbatch is not there: --slurm needs a machine from which jobs are submitted");
   if (result.exit_status != 0)

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -53,8 +54,9 @@ void require_sbatch();
 
 /// Submits the script with sbatch: all of its tasks, or one of them. They begin when the Slurm job
 /// `after` has ended, in whatever way, if it is not empty. Returns the number of the Slurm job.
-/// Throws Error with what sbatch says if that fails, or if it answers no number.
+/// Throws Error with what sbatch says if that fails, or if it answers no number, and
+/// base::StopRequested if `stop_requested` becomes true before sbatch has taken the job.
 std::string submit(const std::filesystem::path& folder, std::optional<int> task = std::nullopt,
-                   const std::string& after = {});
+                   const std::string& after = {}, const std::function<bool()>& stop_requested = {});
 
 }  // namespace tomofield::batch

@@ -39,6 +39,18 @@ State run_to_the_end(const RunOptions& options, const JobList& list, const Job& 
   return running.state();
 }
 
+// Submits a task again whose time is up, and says who goes on.
+void submit_again(const fs::path& folder, int number, TaskResult& result) {
+  try {
+    result.continued_by = submit(folder, number);
+    result.state.reason =
+        fmt::format("its time limit came; Slurm job {} goes on", result.continued_by);
+  } catch (const Error& error) {
+    result.state.reason = fmt::format(
+        "its time limit came, and no task goes on: {}; the batch with --resume does", error.what());
+  }
+}
+
 }  // namespace
 
 void require_same_batch(const fs::path& file, const JobList& list,
@@ -71,9 +83,7 @@ TaskResult run_task(const RunOptions& options, const JobList& list, int number, 
     } else {
       require_same_batch(list_of(options.folder), read_jobs(list_of(options.folder)),
                          list.began_ns);  // the script that goes on is of the same batch
-      result.continued_by = submit(options.folder, number);
-      result.state.reason =
-          fmt::format("its time limit came; Slurm job {} goes on", result.continued_by);
+      submit_again(options.folder, number, result);
     }
   }
   write_state(options.folder, job, result.state);

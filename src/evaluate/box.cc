@@ -3,8 +3,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
+#include "base/log.h"
 #include "io/images/mrc_format.h"
 #include "tomofield/error.h"
 
@@ -31,10 +33,9 @@ std::string to_text(const base::Box& box) {
 }
 
 base::Volume read_box(const io::MrcReader& file, const base::Box& box) {
-  if (file.header().sections_a_volume > 0)
-    throw Error(fmt::format("'{}' is a stack of volumes (space group 401): give a file of one",
-                            file.path().string()));
   base::Volume volume(box.shape(), io::cubic_voxel_size_A(file.header(), file.path()));
+  if (const auto contradiction = io::contradiction_of_mode(file.header()))
+    base::log_warning(fmt::format("'{}' {}", file.path().string(), *contradiction));
   const base::Shape3& shape = volume.shape;
   std::vector<float> rows(static_cast<std::size_t>(file.header().nx * shape.ny));
   for (std::int64_t z = 0; z < shape.nz; ++z) {
@@ -45,6 +46,14 @@ base::Volume read_box(const io::MrcReader& file, const base::Box& box) {
     }
   }
   return volume;
+}
+
+void require_numbers(const base::Volume& volume, const std::filesystem::path& path) {
+  const auto count =
+      std::ranges::count_if(volume.data, [](float value) { return !std::isfinite(value); });
+  if (count == 0) return;
+  throw Error(
+      fmt::format("'{}' has {} voxels that are NaN or infinite: correct it", path.string(), count));
 }
 
 base::Volume read_volume(const std::filesystem::path& path) {

@@ -166,7 +166,11 @@ VolumeScore score_volume(const VolumeScoreOptions& options) {
   const tilt_series::TiltSeries series(options.input);
   SpecimenOptions specimen = options.specimen;
   specimen.thickness = static_cast<double>(volume.shape.nz) * series.bin_factor();
-  check_volume(volume, measurement::plan_measurement(series, specimen), options.volume);
+  const measurement::Measurement plan = measurement::plan_measurement(series, specimen);
+  require_one_voxel_size(fmt::format("'{}'", options.volume.string()), volume.voxel_size_A,
+                         fmt::format("the series '{}'", options.input.stack.string()),
+                         plan.pixel_size_A);
+  check_volume(volume, plan, options.volume);
   measurement::Measurement prepared =
       measurement::prepare_measurement(series, specimen, io::scratch_directory({}));
   keep_beads(prepared);  // all volumes are scored on the same rays

@@ -122,7 +122,16 @@ DetectionScore membrane_score(const base::Volume& volume, const base::Volume& la
                     "1 where there is membrane and 0 elsewhere",
                     num_bad));
   }
-  const base::Volume response = sheet_response(volume, kSheetSigma_A / label.voxel_size_A);
+  const double sigma_px = kSheetSigma_A / label.voxel_size_A;
+  const base::Shape3& shape = label.shape;
+  if (sigma_px > static_cast<double>(std::max({shape.nx, shape.ny, shape.nz})))
+    throw Error(fmt::format(
+        "the filter for sheets blurs by {:g} Å, and all of the volume has {:.3g} Å by "
+        "its voxels of {:g} Å: correct its header",
+        kSheetSigma_A,
+        static_cast<double>(std::max({shape.nx, shape.ny, shape.nz})) * label.voxel_size_A,
+        label.voxel_size_A));
+  const base::Volume response = sheet_response(volume, sigma_px);
   std::vector<Detection> voxels(response.data.size());
   std::size_t num_true = 0;
   for (std::size_t i = 0; i < voxels.size(); ++i) {

@@ -56,7 +56,13 @@ std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcRead
     lies_in_b = lies_in_b && offset[axis] >= 0 && offset[axis] + size_a[axis] <= size_b[axis];
     lies_in_a = lies_in_a && offset[axis] <= 0 && offset[axis] + size_a[axis] >= size_b[axis];
   }
-  const bool says_something = offset != Offset{} || (is_ours(a) && is_ours(b));
+  const bool are_ours = is_ours(a) && is_ours(b);
+  if (are_ours && size_a == size_b && offset != Offset{})
+    throw Error(fmt::format(
+        "'{}' and '{}' are of two places of one volume: the latter begins {}, {}, {} voxels after "
+        "the former (ORIGIN), so give volumes of one region",
+        a.path().string(), b.path().string(), -offset[0], -offset[1], -offset[2]));
+  const bool says_something = offset != Offset{} || are_ours;
   if (!says_something || !(lies_in_a || lies_in_b)) return {};
   return offset;
 }

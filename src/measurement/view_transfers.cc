@@ -133,10 +133,10 @@ void warn_of_unusual_defocus(const Sections& sections, const io::CtfTable& table
   }
   if (count == 0) return;
   base::log_warning(fmt::format(
-      "{} has a defocus of {:.4g} Å in section {}, and {} of its sections one outside {:g} to {:g} "
-      "Å: is it under focus, and in the right unit? (--ctf none goes on without it)",
+      "{} has a defocus of {:.4g} Å in section {}, and one outside {:g} to {:g} Å in {} of its "
+      "sections: is it under focus, and in the right unit? (--ctf none goes on without it)",
       table.file.empty() ? "--defocus" : fmt::format("'{}'", table.file.string()),
-      *unusual(*table.views[first]), first + 1, count, kUsual_A.low(), kUsual_A.high()));
+      *unusual(*table.views[first]), first + 1, kUsual_A.low(), kUsual_A.high(), count));
 }
 
 // Returns the contrast transfer of each section, or nothing without any.
@@ -414,10 +414,11 @@ void require_rings(const tilt_series::PlannedSeries& series, const tilt_series::
   const auto side = static_cast<double>(std::max(series.width(), series.height()));
   if (spread_px <= side) return;
   throw Error(
-      fmt::format("the defocus of {:.4g} µm of section {} spreads detail over {:.3g} of its pixels "
-                  "of {:.4g} Å, "
-                  "and the view has {}: check the defocus and the pixel size, or give --ctf none",
-                  largest_A * 1e-4, view.section + 1, spread_px, transfer.pixel_size_A, side));
+      fmt::format("the defocus of {:.4g} µm of section {} and the spherical aberration of {:g} mm "
+                  "spread detail over {:.3g} of its pixels of {:.4g} Å, and the view has {}: check "
+                  "the defocus, --cs and the pixel size, or give --ctf none",
+                  largest_A * 1e-4, view.section + 1, transfer.optics.spherical_aberration_mm,
+                  spread_px, transfer.pixel_size_A, side));
 }
 
 // Warns of corrections that a stack has had, as its labels say, and that are applied all the same.

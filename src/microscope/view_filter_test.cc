@@ -82,6 +82,23 @@ TEST(SlopeOfTilt, OfARecordedImageIsThatOfItsAlignedPlaces) {
   EXPECT_NEAR(raw.at(c * x - s * y + 12, s * x + c * y - 5), aligned.at(x, y), 1e-9);
 }
 
+TEST(SpreadOfDetail, IsThatOfTheDefocusAndTheSphericalAberration) {
+  ViewTransfer transfer{.optics = {.voltage_kV = 300}, .defocus = {3e4, 2e4, 0, 0}, .slope = {}};
+  transfer.pixel_size_A = 10.0;
+  transfer.optics.spherical_aberration_mm = 0.0;
+  const double wavelength_A = electron_wavelength_A(300);
+  EXPECT_NEAR(spread_px(transfer), wavelength_A * 3e4 / 200.0, 1e-9);
+  transfer.optics.spherical_aberration_mm = 2.7;
+  transfer.pixel_size_A = 0.1;  // λ³ Cs k³ is 26 µm at 5 cycles per Å
+  transfer.defocus = {10.0, 10.0, 0, 0};
+  EXPECT_NEAR(spread_px(transfer), 2.7e7 * std::pow(wavelength_A, 3) * 125.0 / 0.1, 20.0);
+  // At the frequency where both cancel, a lower one is spread most.
+  transfer.pixel_size_A = 1.0;
+  transfer.defocus.u_A = transfer.defocus.v_A = 2.7e7 * wavelength_A * wavelength_A * 0.25;
+  EXPECT_NEAR(spread_px(transfer), 2.7e7 * std::pow(wavelength_A, 3) * 0.25 / std::sqrt(27.0),
+              1e-6);
+}
+
 TEST(LineExtension, KeepsTheLineAndHasNoStep) {
   const LineExtension extension(20, 64);
   std::vector<double> line, extended;

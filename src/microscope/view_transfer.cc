@@ -29,10 +29,22 @@ DefocusSlope slope_of_tilt(double tilt_deg, double pixel_size_A, DefocusHand han
 }
 
 double spread_px(const ViewTransfer& transfer) {
-  const double largest_A =
-      std::max(std::fabs(transfer.defocus.u_A), std::fabs(transfer.defocus.v_A));
-  return electron_wavelength_A(transfer.optics.voltage_kV) * largest_A /
-         (2.0 * transfer.pixel_size_A * transfer.pixel_size_A);
+  constexpr double kAngstroms_in_mm = 1e7;
+  const double wavelength_A = electron_wavelength_A(transfer.optics.voltage_kV);
+  const double cubic =
+      transfer.optics.spherical_aberration_mm * kAngstroms_in_mm * std::pow(wavelength_A, 3);
+  const double finest = 1.0 / (2.0 * transfer.pixel_size_A);
+  double largest_A = 0.0;
+  for (const double defocus_A : {transfer.defocus.u_A, transfer.defocus.v_A}) {
+    const double linear = wavelength_A * defocus_A;
+    const auto spread_A = [&](double k) { return std::fabs(linear * k - cubic * k * k * k); };
+    largest_A = std::max(largest_A, spread_A(finest));
+    // Where both balance, the spread has a maximum between.
+    if (linear > 0.0 && cubic > 0.0)
+      largest_A =
+          std::max(largest_A, spread_A(std::min(finest, std::sqrt(linear / (3.0 * cubic)))));
+  }
+  return largest_A / transfer.pixel_size_A;
 }
 
 }  // namespace tomofield::microscope

@@ -59,8 +59,9 @@ struct ViewTransfer {
   }
 };
 
-/// Returns over how many pixels the defocus spreads the finest detail of an image, λ Δz / (2 p²).
-/// Where these are more than the image has, the rings of the transfer are too narrow to be told
+/// Returns over how many pixels the defocus and the spherical aberration spread detail of an image:
+/// the largest |λ Δz k − Cs λ³ k³| of frequencies k up to 1 / (2 p), over the pixel size p. Where
+/// these are more than the image has, the rings of the transfer are too narrow to be told
 /// apart, and no correction means anything (Crowther et al. 1996).
 double spread_px(const ViewTransfer& transfer);
 

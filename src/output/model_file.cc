@@ -157,10 +157,12 @@ class ModelReader {
 
   void read_info(const StoredGroup& root, ModelInfo& info) const {
     require_known_format(root);
-    info.x_tilt_deg = root.number("x_tilt_deg", base::kLargestAngle_deg);
+    info.x_tilt_deg = root.number("x_tilt_deg", base::kLargestTilt_deg);
     info.pixel_size_A = root.number("pixel_size_A", base::kPixelSizes_A);
     info.density_unit = root.number("density_unit", kDensityUnits);
-    info.is_dark = root.text("contrast") == "dark";
+    const std::string contrast = root.text("contrast");
+    require(contrast == "dark" || contrast == "bright", "its contrast is neither dark nor bright");
+    info.is_dark = contrast == "dark";
     info.options_json = root.text("options_json");
     info.written_by = root.text("written_by");
     read_geometry(root.group("geometry"), info);

@@ -28,13 +28,15 @@ double largest_tilt_deg(const TiltRange& tilts) {
   return std::max(std::abs(tilts.first_deg), std::abs(tilts.last_deg));
 }
 
-// Returns over how many pixels the largest defocus spreads detail.
+// Returns over how many pixels the smallest or the largest defocus spreads detail.
 double largest_spread_px(const Imaging& imaging, double voxel_size_A) {
   constexpr double kAngstroms_in_um = 1e4;
   microscope::ViewTransfer transfer{.optics = imaging.optics, .defocus = {}, .slope = {}};
   transfer.pixel_size_A = voxel_size_A;
   transfer.defocus.u_A =
       kAngstroms_in_um * (imaging.defocus->high_um + imaging.astigmatism_um / 2.0);
+  transfer.defocus.v_A =
+      kAngstroms_in_um * (imaging.defocus->low_um - imaging.astigmatism_um / 2.0);
   return microscope::spread_px(transfer);
 }
 
@@ -135,7 +137,7 @@ std::vector<std::string> SimulationOptions::validate() const {
     require(is_spread(low, 50.0) && high >= low && high <= 50.0, "the defocus in µm", high,
             "a range within 0 to 50, the smaller number first");
     require(largest_spread_px(i, voxel_size_A) <= static_cast<double>(cell.size_px),
-            "the number of pixels over which the defocus spreads detail",
+            "the number of pixels over which the defocus and --cs spread detail",
             largest_spread_px(i, voxel_size_A),
             fmt::format("at most {}, as views have: take a smaller defocus, larger voxels or views",
                         cell.size_px));

@@ -8,6 +8,8 @@
 
 #include "base/log.h"
 #include "base/plausible.h"
+#include "io/tables/text_lines.h"
+#include "tilt_series/tilt_axis.h"
 #include "tomofield/error.h"
 
 namespace tomofield::tilt_series {
@@ -98,6 +100,30 @@ void warn_of_other_size(const io::Mdoc& mdoc, const std::filesystem::path& path,
                      stack);
 }
 
+// Warns of titles among the labels that state no axis that can be, or another one than the extended
+// header does.
+void warn_of_titles(const TiltSeriesOptions& options, const io::ImageStack& stack) {
+  constexpr double kSame_deg = 10.0;
+  const io::MrcHeader& header = stack.header();
+  if (options.tilt_axis_deg) return;
+  for (const std::string& label : header.labels) {
+    const auto word = io::axis_of_title(label);
+    if (!word) continue;
+    const auto axis_deg = io::parse_number(*word, base::kLargestAngle_deg);
+    if (!axis_deg)
+      base::log_warning(fmt::format(
+          "a label of '{}' states a tilt axis of '{}', which is no angle: give the right one with "
+          "--tilt-axis",
+          stack.name(), io::quote(*word)));
+    else if (header.extended_axis_deg &&
+             angle_between_axes(*axis_deg, *header.extended_axis_deg) > kSame_deg)
+      base::log_warning(fmt::format(
+          "a label of '{}' states a tilt axis of {:.6g}°, and its extended header one of {:.6g}°: "
+          "give the right one with --tilt-axis",
+          stack.name(), double{*axis_deg}, *header.extended_axis_deg));
+  }
+}
+
 }  // namespace
 
 std::optional<io::MrcFacts> facts_of(const TiltSeriesOptions& options,
@@ -139,10 +165,9 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& s
 void warn_of_headers(const TiltSeriesOptions& options, const io::ImageStack& stack,
                      const std::optional<io::Mdoc>& mdoc) {
   const io::MrcHeader& header = stack.header();
-  if (!header.extended_difference.empty())
-    base::log_warning(
-        fmt::format("the header of '{}' states {}: that of the first section is taken",
-                    stack.name(), header.extended_difference));
+  for (const std::string& difference : header.differences)
+    base::log_warning(fmt::format("the header of '{}' states {}", stack.name(), difference));
+  warn_of_titles(options, stack);
   if (mdoc)
     for (const std::string& difference : mdoc->differences)
       base::log_warning(fmt::format("'{}' states {}", options.mdoc->string(), difference));

@@ -153,21 +153,10 @@ void require_whole_images(const io::ImageStack& stack) {
       stack.name()));
 }
 
-/// Warns if the header states values that its mode cannot hold: programs have written unsigned
-/// 16-bit numbers as signed ones, and the other way round.
+/// Warns if the header states values that its mode cannot hold.
 void warn_of_mode(const io::ImageStack& stack) {
-  const io::MrcHeader& header = stack.header();
-  constexpr double kLargestSigned = 32767.0;
-  const bool is_unsigned =
-      header.mode == io::MrcMode::kInt16 && header.max > kLargestSigned && header.max >= header.min;
-  const bool is_signed =
-      header.mode == io::MrcMode::kUint16 && header.min < 0.0 && header.max >= header.min;
-  if (!is_unsigned && !is_signed) return;
-  base::log_warning(fmt::format(
-      "'{}' has 16-bit numbers with{} sign (mode {}), and its header states values from {:g} to "
-      "{:g}: those that do not fit are misread, so convert it (IMOD's newstack -mode 2)",
-      stack.name(), is_unsigned ? "" : "out a", static_cast<int>(header.mode), header.min,
-      header.max));
+  if (const auto contradiction = io::contradiction_of_mode(stack.header()))
+    base::log_warning(fmt::format("'{}' {}", stack.name(), *contradiction));
 }
 
 void warn_of_sections_beyond(const TiltSeriesOptions& options, const io::ImageStack& stack) {

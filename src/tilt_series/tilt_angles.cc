@@ -11,10 +11,6 @@
 namespace tomofield::tilt_series {
 namespace {
 
-// Beyond this tilt a ray crosses several times the specimen's thickness and would need an ever
-// wider margin.
-constexpr double kLargestTilt_deg = 80.0;
-
 TiltAngles angles_of_mdoc(const io::Mdoc& mdoc, const std::filesystem::path& path,
                           const io::ImageStack& stack) {
   require_count(mdoc.sections.size(), path, "sections", stack);
@@ -66,7 +62,7 @@ std::string describe_steep(const TiltAngles& angles, const std::vector<std::int6
       "'{}': the tilt angle{} {} {} beyond ±{:.0f}°, which cannot be reconstructed; correct {}, or "
       "leave the section{} out with --exclude {}",
       angles.source, is_one ? "" : "s", fmt::join(texts, ", "), is_one ? "is" : "are",
-      kLargestTilt_deg, is_one ? "it" : "them", is_one ? "" : "s", io::section_list(steep));
+      base::kLargestTilt_deg, is_one ? "it" : "them", is_one ? "" : "s", io::section_list(steep));
 }
 
 void require_different(const TiltAngles& angles, std::span<const std::int64_t> sections,
@@ -145,7 +141,7 @@ void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t
       missing.push_back(section + 1);
     else if (!std::isfinite(angle->value))
       unusable.push_back(section + 1);
-    else if (std::fabs(angle->value) > kLargestTilt_deg)
+    else if (std::fabs(angle->value) > base::kLargestTilt_deg)
       steep.push_back(section + 1);
   }
   if (!missing.empty()) {

@@ -829,6 +829,67 @@ def test_a_batch_that_is_stopped_goes_on(data, number):
     assert "resum" in harness.read_bytes(log).decode()
 
 
+def sbatch_that_runs(folder, commands):
+    """Returns the environment with an sbatch that runs these commands of the shell."""
+    environment = fake_sbatch(folder, "")
+    pathlib.Path(folder, "sbatch").write_text(f"#!/bin/sh\n{commands}\n", encoding="utf-8")
+    return environment
+
+
+@pytest.mark.parametrize("number, to_all", [(signal.SIGTERM, False), (signal.SIGINT, True)])
+def test_a_stop_while_sbatch_answers_submits_nothing(data, number, to_all):
+    folder = harness.fresh_directory("slow_sbatch")
+    run = harness.start("batch", *pattern(data), *QUICK, "--tv", 5, "--prior", "tv", "--slurm", "-o",
+                        os.path.join(folder, "results"), start_new_session=True,
+                        env=sbatch_that_runs(folder, f"touch {folder}/asked; sleep 30; echo 77"))
+    while not os.path.exists(os.path.join(folder, "asked")):
+        time.sleep(0.05)
+        assert run.poll() is None, run.communicate()
+    os.killpg(run.pid, number) if to_all else run.send_signal(number)
+    said = run.communicate(timeout=20)[1]
+    assert run.returncode == 128 + number and "no job was submitted" in said, (run.returncode, said)
+
+
+def test_a_job_that_was_submitted_before_sbatch_refused_another_is_named(data):
+    folder = harness.fresh_directory("half_submitted")
+    said = harness.tomofield("batch", *pattern(data), *QUICK[:-4], "--slurm", "-o", os.path.join(folder, "results"),
+                             env=sbatch_that_runs(folder, 'case "$*" in *--array=*) echo 77;; '
+                                                          "*) echo no more; exit 1;; esac"))
+    assert said.returncode == 2 and "no more" in said.stderr and "scancel 77" in said.stderr, said
+
+
+def test_a_task_that_cannot_be_submitted_again_says_so_in_the_summary(data):
+    folder = harness.fresh_directory("not_again")
+    results = os.path.join(folder, "results")
+    command = ["batch", os.path.join(data, "a.mrc"), *pattern(data)[1:],
+               *harness.merge(QUICK, ["--epochs", 4000]), "--tv", 5, "--prior", "tv", "--slurm", "-o", results]
+    harness.succeed(*command, env=fake_sbatch(folder, "55\\n"))
+    task = subprocess.Popen(["sh", os.path.join(results, "batch.sbatch")], stderr=subprocess.PIPE, text=True,
+                            env={**sbatch_that_runs(folder, "echo at the limit; exit 1"),
+                                 "SLURM_ARRAY_TASK_ID": "1"})
+    model = os.path.join(results, "a.h5")
+    while "a.log" not in os.listdir(os.path.join(results, "logs")) or \
+            b"epoch" not in harness.read_bytes(os.path.join(results, "logs/a.log")):
+        time.sleep(0.05)
+        assert task.poll() is None, task.communicate()
+    task.send_signal(signal.SIGUSR1)
+    said = task.communicate(timeout=60)[1]
+    assert task.returncode == 128 + signal.SIGUSR1 and "at the limit" in said, (task.returncode, said)
+    assert os.path.exists(model) and summary(results)["a"]["state"] == "stopped"
+    assert "at the limit" in summary(results)["a"]["reason"]
+
+
+def test_a_series_that_ends_before_it_speaks_has_a_reason(data):
+    folder = harness.fresh_directory("silent")
+    launcher = pathlib.Path(folder, "launch.sh")
+    launcher.write_text('#!/bin/bash\ncase "$*" in *--plan=*) ;; *b.mrc*) kill -TERM $$;; esac\n'
+                        f'exec {harness.PROGRAM} "$@"\n', encoding="utf-8")
+    launcher.chmod(0o755)
+    harness.tomofield("batch", *pattern(data), *QUICK, "--choose", "each", "-o", os.path.join(folder, "results"),
+                      env={**os.environ, "TOMOFIELD_LAUNCHER": str(launcher)})
+    assert "signal 15" in summary(os.path.join(folder, "results"))["b"]["reason"]
+
+
 def test_a_series_that_another_run_writes_is_waited_for(data):
     """The runs of a batch that was killed may still end in order, and their files are no faults."""
     folder = harness.fresh_directory("still_running")

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import struct
 import subprocess
 
 import mrcfile
@@ -154,6 +155,33 @@ def test_voxels_that_are_no_cubes_are_refused():
         assert result.returncode == 2 and "10 × 10 × 40 Å" in result.stderr, result
 
 
+def test_values_that_their_mode_cannot_hold_are_warned_of():
+    """The header states the values that another program meant to write."""
+    for mode, largest in (("int8", 255), ("int16", 51000)):
+        file = path("wrapped.mrc")
+        values = np.random.default_rng(3).integers(-90, 90, (10, 20, 30)).astype(mode)
+        with mrcfile.new(file, values, overwrite=True) as volume:
+            volume.set_volume()
+            volume.voxel_size = 10
+            volume.header.dmin, volume.header.dmax = 0, largest
+        if mode == "int8":  # IMOD's stamp, and its flag for bytes with a sign
+            with open(file, "r+b") as bytes_of_file:
+                bytes_of_file.seek(152)
+                bytes_of_file.write(struct.pack("<ii", 1146047817, 1))
+        for command in (["evaluate", file, file], ["info", file]):
+            said = harness.succeed(*command)
+            assert f"from 0 to {largest}" in said.stderr and "misread" in said.stderr, said
+
+
+def test_membranes_need_voxels_that_can_be():
+    """The filter would blur over twenty thousand voxels."""
+    label = np.zeros((10, 20, 30), np.float32)
+    label[5] = 1
+    file = save("tiny_voxels.mrc", label, voxel_size=0.002)
+    result = run(file, "--membranes", file)
+    assert result.returncode == 2 and "voxels of 0.002 Å" in result.stderr, result
+
+
 def test_equal_volumes_are_infinitely_alike():
     _, truth = random_pair((10, 20, 30), 7)
     file = save("a.mrc", truth)
@@ -178,6 +206,11 @@ def test_origins_say_where_a_part_lies():
     assert found["box_last"] == [51, 40, 24], found
     found, result = evaluate(save("corner.mrc", corner), whole)
     assert found["box_first"] == [0, 10, 0] and "centred" in result.stdout + result.stderr, found
+    # Volumes of one size that tomofield wrote do not lie on each other elsewhere.
+    left, right = (save(name, reconstruction, label="tomofield 1", origin=origin)
+                   for name, origin in (("left.mrc", (0, 0, 0)), ("right.mrc", (510, 0, 0))))
+    result = run(left, right)
+    assert result.returncode == 2 and "51, 0, 0 voxels" in result.stderr, result
     # A nonsensical ORIGIN is ignored.
     found, _ = evaluate(save("corner.mrc", corner, origin=(3, 4, 1e30)), whole)
     assert found["box_first"] == [0, 10, 0], found
@@ -361,6 +394,8 @@ def test_fsc_under_a_mask_and_in_a_box():
     assert "psnr_raw_dB" not in boxed and boxed["fsc"]["box_first"] == [5, 3, 2]
     for mask_file, words in ((save("m.mrc", 2 * mask), "from 0 to 1"),
                              (save("m2.mrc", mask[1:]), "36 × 30 × 23"),
+                             (save("m4.mrc", mask, voxel_size=20), "20 Å"),
+                             (save("m5.mrc", np.where(mask > 0.9, np.nan, mask)), "NaN"),
                              (save("m3.mrc", 0 * mask), "not all be 0")):
         result = run(*files, "--fsc-mask", mask_file)
         assert result.returncode == 2 and words in result.stderr, result
@@ -507,6 +542,9 @@ def test_reprojection_error():
     np.testing.assert_allclose(flat["scale"], scale, rtol=1e-4)
     np.testing.assert_allclose(flat["offset"], offset, atol=1e-3)
     np.testing.assert_allclose(flat["error"] * flat["noise_sigma"] ** 2, residual, rtol=1e-3)
+    wide = save("wide.mrc", volume, voxel_size=2 * float(mrcfile.open(truth, header_only=True).voxel_size.x))
+    refused = run(wide, *series, "--no-margin")
+    assert refused.returncode == 2 and "bring them to one voxel size" in refused.stderr, refused
     # Units and contrast do not matter. The hand does, and so does a volume that lacks something.
     other, _ = evaluate(save("units.mrc", -30 * volume), *series, "--no-margin")
     np.testing.assert_allclose(other["reprojection"]["error"], found["error"], rtol=1e-3)

@@ -727,6 +727,13 @@ def test_the_description_of_a_tiff_stack_states_its_axis(tmp_path):
     np.savetxt(tmp_path / "s.tlt", np.linspace(-60, 60, 11))
     said = harness.tomofield("info", tmp_path / "s.tif", "--tlt", tmp_path / "s.tlt")
     assert said.returncode == 2 and "turned by 86.1" in said.stderr, said.stderr
+    for first, others, part in (("400.0", "400.0", "axis of '400.0'"), ("0.5", "85.0", "85° on page 2")):
+        with tifffile.TiffWriter(tmp_path / "s.tif") as file:
+            for i, view in enumerate(views):
+                file.write(view, photometric="minisblack", metadata=None,
+                           description=f"SerialEM: x\n    Tilt axis angle = {others if i else first}, binning = 1")
+        said = harness.succeed("info", tmp_path / "s.tif", "--tlt", tmp_path / "s.tlt")
+        assert part in said.stderr, said.stderr
 
 
 def test_a_defocus_for_other_pixels_is_warned_of(tmp_path):

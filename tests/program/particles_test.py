@@ -232,6 +232,18 @@ def test_lists_that_make_no_sense_are_refused(folder):
         assert not os.path.exists(os.path.join(folder, "cut.mrc"))
 
 
+def test_pixels_of_another_series_are_warned_of(folder):
+    """Coordinates count from the middle of its pixels."""
+    particles = write_particles(folder)
+    assert "pixels of" not in cut_out(folder, "--particles", particles, "--box", 8).stderr
+    with open(particles, encoding="utf-8") as file:
+        text = file.read().replace(f"1 one {PIXEL_A}", f"1 one {8 * PIXEL_A}")
+    with open(particles, "w", encoding="utf-8") as file:
+        file.write(text)
+    said = cut_out(folder, "--particles", particles, "--box", 8).stderr
+    assert f"pixels of {8 * PIXEL_A:g} Å" in said and f"{PIXEL_A:g} Å" in said, said
+
+
 def test_a_stack_of_integers_keeps_its_values(folder):
     particles = write_particles(folder)
     cut_out(folder, "--particles", particles, "--box", 8)

@@ -217,7 +217,8 @@ def test_particles_of_yardstick_d_are_found_in_its_truth(counted):
 
 
 def test_a_density_is_not_replaced_by_the_series_that_is_made_of_it(counted):
-    density = counted.path("truth.mrc")
+    density = os.path.join(harness.fresh_directory("of_its_density"), "truth.mrc")
+    shutil.copy(counted.path("particle_ribosome.mrc"), density)
     before = harness.read_bytes(density)
     said = run("simulate", os.path.dirname(density), *COUNTED, "--particles", f"{density},2",
                "--overwrite")
@@ -252,6 +253,17 @@ def test_particles_of_files_take_the_place_of_random_proteins(counted):
     n = min(len(given), len(made)) // 2
     middle = [slice(len(v) // 2 - n, len(v) // 2 + n) for v in (given, made)]
     assert np.corrcoef(given[(middle[0],) * 3].ravel(), made[(middle[1],) * 3].ravel())[0, 1] > 0.9
+
+
+def test_particles_that_no_field_of_view_holds_are_refused(counted, tmp_path):
+    for voxel_A in (1e6, 200, 0.01):
+        with mrcfile.new(tmp_path / "one.mrc", counted.read("particle_ribosome.mrc").astype(np.float32),
+                         overwrite=True) as file:
+            file.set_volume()
+            file.voxel_size = voxel_A
+        said = harness.tomofield("simulate", tmp_path / "s", *COUNTED, "--particles", f"{tmp_path}/one.mrc,2")
+        assert said.returncode == 2 and "the field of view" in said.stderr and "one.mrc" in said.stderr, said
+        assert not os.path.exists(tmp_path / "s")
 
 
 def test_yardstick_d_is_made_by_its_seed_whatever_the_threads():

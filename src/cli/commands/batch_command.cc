@@ -221,13 +221,34 @@ std::string script_for(const BatchArguments& arguments, const batch::JobList& li
                       list.jobs);
 }
 
+[[noreturn]] void throw_stopped_submission(const std::string& submitted) {
+  throw ExitStatus(
+      stop_status(),
+      submitted.empty()
+          ? "stopped; no job was submitted"
+          : fmt::format("stopped; Slurm job {} was submitted before: scancel {} ends it", submitted,
+                        submitted));
+}
+
 void run_by_slurm(const BatchArguments& arguments, const batch::JobList& list,
                   const std::string& script, bool chooses) {
   const fs::path folder = arguments.folder;
   if (batch::largest_first(list.jobs).empty()) return print_summary(folder);
   io::write_text_file(batch::script_of(folder), script);
-  const std::string choosing = chooses ? batch::submit(folder, batch::kChoosingTask) : "";
-  const std::string job = batch::submit(folder, std::nullopt, choosing);
+  std::string choosing, job;
+  try {
+    if (chooses) choosing = batch::submit(folder, batch::kChoosingTask, "", stop_was_requested);
+    job = batch::submit(folder, std::nullopt, choosing, stop_was_requested);
+  } catch (const base::StopRequested&) {
+    throw_stopped_submission(choosing);
+  } catch (const Error& error) {
+    if (choosing.empty()) throw;
+    throw Error(
+        fmt::format("{}; Slurm job {}, which chooses for all series, was submitted before: "
+                    "scancel {} ends it",
+                    error.what(), choosing, choosing));
+  }
+  if (stop_was_requested()) throw_stopped_submission(job);
   print("script    {}\nSlurm job {}{}\n", batch::script_of(folder).string(), job,
         chooses ? fmt::format(", after {}, which chooses for all series", choosing) : "");
   print_summary(folder);
@@ -253,7 +274,7 @@ void run_task(const CLI::App& command, const BatchArguments& arguments) {
                              result.state.reason.empty() ? "" : ": ", result.state.reason));
   if (result.state.progress == batch::Progress::kFailed) throw ExitStatus(1, result.state.reason);
   if (result.state.progress == batch::Progress::kStopped && result.continued_by.empty())
-    throw ExitStatus(stop_status(), "stopped");
+    throw ExitStatus(stop_status(), result.state.reason.empty() ? "stopped" : result.state.reason);
 }
 
 void run(const CLI::App& command, const BatchArguments& arguments,

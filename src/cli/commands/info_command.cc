@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "base/enum_names.h"
+#include "base/log.h"
 #include "cli/commands/commands.h"
 #include "cli/options/help_formatter.h"
 #include "cli/options/project_options.h"
@@ -77,6 +78,8 @@ void print_extended_header(const io::MrcHeader& header) {
 void print_mrc(const std::filesystem::path& path) {
   const io::MrcReader reader(path);
   const io::MrcHeader& header = reader.header();
+  if (const auto contradiction = io::contradiction_of_mode(header))
+    base::log_warning(fmt::format("'{}' {}", path.string(), *contradiction));
   print("{}: MRC {}\n", path.string(), header.is_volume ? "volume" : "image stack");
   print("  size             {} × {} × {} (x, y, sections)\n", header.nx, header.ny, header.nz);
   print("  values           {}{}, {}-endian\n", io::describe(header.mode),

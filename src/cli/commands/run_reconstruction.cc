@@ -128,7 +128,7 @@ void require_finished(const reconstruction::RunResult& run,
     case reconstruction::Outcome::kStopped:
       throw stopped("the checkpoint is", run.checkpoint, options, leaves_trace);
     case reconstruction::Outcome::kStoppedTuning:
-      if (options.fit.tune)
+      if (options.fit.tune && std::filesystem::exists(paths.trials))
         throw stopped("the finished trials are in", paths.trials, options, leaves_trace);
       if (std::filesystem::exists(paths.alignment) && options.run.align != Alignment::kOff)
         throw stopped("the alignment is in", paths.alignment, options, leaves_trace);

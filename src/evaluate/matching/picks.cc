@@ -127,6 +127,7 @@ std::vector<ParticleReference> read_particles(const std::filesystem::path& list)
     if (reference == references.end()) {
       const auto file = density_of(list, kind);
       reference = references.insert(references.end(), {kind, read_volume(file), {}});
+      require_numbers(reference->density, file);
       const base::Shape3& n = reference->density.shape;
       if (n.nx != n.ny || n.ny != n.nz || n.nx % 2 != 0)
         throw Error(

@@ -18,6 +18,7 @@
 #include "base/utf8.h"
 #include "evaluate/volume_pair.h"
 #include "io/images/mrc.h"
+#include "io/images/mrc_format.h"
 #include "tomofield/error.h"
 
 namespace tomofield::evaluate {
@@ -217,7 +218,14 @@ base::Volume read_mask(const std::filesystem::path& path, const std::filesystem:
     throw Error(fmt::format("the mask '{}' has {} voxels and '{}' {}: give a mask of that size",
                             path.string(), size(mask), second.string(), size(volume)));
   }
-  return read_box(mask, box);
+  const auto quoted = [](const std::filesystem::path& file) {
+    return fmt::format("'{}'", file.string());
+  };
+  base::Volume weights = read_box(mask, box);
+  require_one_voxel_size("the mask " + quoted(path), weights.voxel_size_A, quoted(second),
+                         io::cubic_voxel_size_A(volume.header(), second));
+  require_numbers(weights, path);
+  return weights;
 }
 
 }  // namespace

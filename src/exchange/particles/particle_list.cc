@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <set>
 
@@ -104,6 +105,11 @@ std::optional<double> series_pixel_A(const fs::path& path, const io::StarTable& 
   return std::nullopt;
 }
 
+bool are_other_pixels(double stated_A, double of_model_A) {
+  constexpr double kCalibration = 0.02;
+  return std::fabs(stated_A - of_model_A) > kCalibration * of_model_A;
+}
+
 /// Returns the rotation that three angles of a row state. As in RELION, one that is not stated is
 /// 0.
 field::Rotation rotation_of(const io::StarRow& row, const std::array<const char*, 3>& columns) {
@@ -142,8 +148,16 @@ ParticleList read_relion(const fs::path& path, const fs::path& model_file,
     list.optics = *optics;
   const Point centre = output::VolumeFrame(model).centre();
   const double of_model_A = unbinned_pixel_A(model);
+  bool is_warned = false;
   for (std::size_t row = 0; row < list.table.num_rows(); ++row) {
     const auto of_series_A = series_pixel_A(path, list.optics, list.table.find(row, kOpticsGroup));
+    if (!is_warned && of_series_A && are_other_pixels(*of_series_A, of_model_A)) {
+      is_warned = true;
+      base::log_warning(fmt::format(
+          "'{}' states pixels of {:.6g} Å for the tilt series (_{}), and the model's series has "
+          "{:.6g} Å: coordinates count from the centre by the former",
+          path.string(), *of_series_A, kSeriesPixel, of_model_A));
+    }
     list.particles.push_back(relion_particle(io::StarRow(path, list.table, row), centre,
                                              model.pixel_size_A, of_series_A.value_or(of_model_A)));
   }

@@ -1,11 +1,14 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <utility>
 
 #include "base/check.h"
 #include "io/images/image_stack.h"
+#include "io/images/mrc_format.h"
 #include "io/saving/file_identity.h"
 #include "io/tables/alignment_files.h"
 #include "tomofield/error.h"
@@ -19,13 +22,19 @@ class FilesStack : public ImageStack {
   FilesStack(const std::vector<ImageInFile>& images, std::string name) : name_(std::move(name)) {
     require_distinct(images);
     std::map<std::filesystem::path, std::shared_ptr<const ImageStack>> opened;
+    std::vector<double> tilts_deg;
     for (const ImageInFile& image : images) {
       std::shared_ptr<const ImageStack>& stack = opened[image.file];
       if (!stack) stack = open_image_stack(image.file);
       require_fits(image, stack->header());
+      take_tilts(stack->header(), tilts_deg);
       sections_.push_back({stack, image.section.value_or(0)});
     }
     header_.nz = std::ssize(images);
+    const bool differ = std::ranges::adjacent_find(tilts_deg, std::ranges::not_equal_to{}) !=
+                        tilts_deg.end();  // headers without a tilt have 0
+    if (differ && tilts_deg.size() == images.size())
+      header_.extended_tilt_deg = std::move(tilts_deg);
   }
 
   const MrcHeader& header() const override { return header_; }
@@ -92,19 +101,39 @@ class FilesStack : public ImageStack {
     }
   }
 
-  // Notes if an image states another tilt axis or voltage than the first one.
+  // Notes if an image states another tilt axis, voltage or pixel size than the images before it, or
+  // something that contradicts itself. Takes what those before it do not state.
   void note_difference(const MrcHeader& found, const std::string& file) {
     const auto axis = [](const MrcHeader& header) {
       const std::vector<double> titles = axes_of_labels(header.labels);
       return titles.empty() ? header.extended_axis_deg : std::optional(titles.front());
     };
-    const auto note = [&](const char* what, const auto& here, const auto& first) {
-      if (here && first && are_two_axes(*here, *first) && header_.extended_difference.empty())
-        header_.extended_difference = fmt::format(
-            "{} of {:.6g} in '{}', and of {:.6g} in the first image", what, *here, file, *first);
+    const auto note = [&](const char* what, const auto& here, const auto& before) {
+      if (here && before && are_two_axes(*here, *before) && header_.differences.empty())
+        header_.differences.push_back(
+            fmt::format("{} of {:.6g} in '{}', and of {:.6g} in an image before, which is taken",
+                        what, *here, file, *before));
     };
     note("a tilt axis in degrees", axis(found), axis(header_));
     note("a voltage in kV", found.extended_voltage_kV, header_.extended_voltage_kV);
+    if (!axis(header_)) header_.extended_axis_deg = axis(found);
+    if (!header_.extended_voltage_kV) header_.extended_voltage_kV = found.extended_voltage_kV;
+    if (!header_.extended_pixel_A) header_.extended_pixel_A = found.extended_pixel_A;
+    if (!contradiction_of_mode(header_) && contradiction_of_mode(found)) {
+      header_.mode = found.mode;
+      header_.min = found.min;
+      header_.max = found.max;
+      header_.bytes_are_unsigned = found.bytes_are_unsigned;
+    }
+    for (const std::string& difference : found.differences)
+      if (header_.differences.empty())
+        header_.differences.push_back(fmt::format("{} (in '{}')", difference, file));
+  }
+
+  // Takes the tilts that the headers of single images state, if all do.
+  void take_tilts(const MrcHeader& found, std::vector<double>& tilts_deg) const {
+    if (found.nz == 1 && found.extended_tilt_deg.size() == 1)
+      tilts_deg.push_back(found.extended_tilt_deg.front());
   }
 
   std::string name_;

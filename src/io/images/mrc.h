@@ -46,9 +46,9 @@ struct MrcHeader {
   std::optional<double> extended_axis_deg;
   std::optional<double> extended_voltage_kV;  ///< of the microscope, in the extended header
   std::optional<double> extended_pixel_A;     ///< width of a pixel, in the extended header
-  /// Says for messages in what the sections of the extended header differ: "pixels in Å of 7 in
-  /// section 2, and of 3.5 in the first". It is empty if they do not.
-  std::string extended_difference;
+  /// Says for messages what the header states twice and differently, or that cannot be: "pixels in
+  /// Å of 7 in section 2, and of 3.5 in the first, which is taken".
+  std::vector<std::string> differences;
   bool has_pieces = false;  ///< by the extended header: sections are the pieces of montages
   std::vector<std::string> labels;
 };

@@ -23,7 +23,8 @@ constexpr std::size_t kFirstShort = 128, kSecondShort = 130;
 constexpr double kLargestTilt_deg = 180.0;
 constexpr double kAngstroms_in_m = 1e10;
 constexpr double kSamePixel = 0.02;  // of calibrations
-constexpr std::string_view kPixelsInA = "pixels in Å";
+constexpr double kSameAxis_deg = 1.0;
+constexpr std::string_view kPixelsInA = "pixels in Å", kAxisInDegrees = "a tilt axis in degrees";
 
 // Returns the number at an offset in a file of either byte order.
 template <typename T>
@@ -61,7 +62,7 @@ void take_tilts(std::vector<double> tilts_deg, MrcHeader& header) {
       tilts_deg, [](double tilt) { return base::is_plausible(tilt, kLargestTilt_deg); });
   const bool differ =
       std::ranges::any_of(tilts_deg, [&](double tilt) { return tilt != tilts_deg.front(); });
-  if (are_angles && differ) header.extended_tilt_deg = std::move(tilts_deg);
+  if (are_angles && (differ || header.nz == 1)) header.extended_tilt_deg = std::move(tilts_deg);
 }
 
 void take_pixel_size(double width_A, double height_A, MrcHeader& header) {
@@ -80,9 +81,9 @@ void note_difference(std::string_view what, const OfSection& of_section, double 
   for (std::int64_t section = 1; section < header.nz && first; ++section) {
     const std::optional<double> other = of_section(section);
     if (!other || !(std::fabs(*other - *first) > tolerance)) continue;
-    header.extended_difference =
-        fmt::format("{} of {:.6g} in section {}, and of {:.6g} in the first", what, *other,
-                    section + 1, *first);
+    header.differences.push_back(
+        fmt::format("{} of {:.6g} in section {}, and of {:.6g} in the first, which is taken", what,
+                    *other, section + 1, *first));
     return;
   }
 }
@@ -90,6 +91,17 @@ void note_difference(std::string_view what, const OfSection& of_section, double 
 void take_axis(double axis_deg, MrcHeader& header) {
   if (base::is_plausible(axis_deg, base::kLargestAngle_deg))
     header.extended_axis_deg = std::remainder(axis_deg, 360.0);
+  else
+    header.differences.push_back(fmt::format(
+        "a tilt axis of {:g}°, which cannot be: give the right one with --tilt-axis", axis_deg));
+}
+
+// Takes a voltage in V. Some programs have written kV.
+void take_voltage(double voltage, MrcHeader& header) {
+  constexpr base::Interval kVoltages_kV{20, 3000};
+  constexpr double kVolts_in_kV = 1e3;
+  for (const double voltage_kV : {voltage / kVolts_in_kV, voltage})
+    if (kVoltages_kV.find(voltage_kV)) header.extended_voltage_kV = voltage_kV;
 }
 
 // Tells whether two sections have the same place along Z, by the coordinates of pieces.
@@ -128,7 +140,7 @@ void read_serialem(std::span<const std::byte> extended, const ExtendedRecords& r
 
 void read_floats(std::span<const std::byte> extended, const ExtendedRecords& records,
                  MrcHeader& header) {
-  constexpr std::int64_t kAxis = 10, kPixel = 11;
+  constexpr std::int64_t kAxis = 10, kPixel = 11, kVoltage = 13;
   const auto value = [&](std::int64_t section, std::int64_t index) {
     return static_cast<double>(number_at<float>(
         extended, section * records.bytes_per_section + records.first_float + 4 * index,
@@ -139,7 +151,12 @@ void read_floats(std::span<const std::byte> extended, const ExtendedRecords& rec
     tilts_deg.push_back(value(section, 0));
   take_tilts(std::move(tilts_deg), header);
   if (records.num_floats <= kPixel) return;
-  take_axis(records.is_fei ? -value(0, kAxis) : value(0, kAxis), header);
+  const auto axis_deg = [&](std::int64_t section) {
+    return records.is_fei ? -value(section, kAxis) : value(section, kAxis);
+  };
+  take_axis(axis_deg(0), header);
+  note_difference(kAxisInDegrees, axis_deg, kSameAxis_deg, header);
+  if (records.is_fei && records.num_floats > kVoltage) take_voltage(value(0, kVoltage), header);
   constexpr double kSmallest_A = 0.05;  // a smaller number is in metres
   const auto pixel_A = [&](std::int64_t section) {
     const double pixel = value(section, kPixel);
@@ -204,31 +221,34 @@ void read_fei(std::span<const std::byte> extended, MrcHeader& header) {
   std::vector<double> tilts_deg;
   std::vector<FeiRecord> records;
   for (std::size_t at = 0; std::ssize(records) < header.nz;) {
-    if (at + FeiRecord::kSmallest > extended.size()) return;
+    if (at + FeiRecord::kSmallest > extended.size()) break;
     const FeiRecord record(extended.subspan(at), header.is_byte_swapped);
-    const auto tilt_deg = record.tilt_deg();
-    if (!tilt_deg || record.size() < FeiRecord::kSmallest) return;
-    tilts_deg.push_back(*tilt_deg);
+    if (record.size() < FeiRecord::kSmallest) break;
+    if (const auto tilt_deg = record.tilt_deg()) tilts_deg.push_back(*tilt_deg);
     records.push_back(record);
     at += static_cast<std::size_t>(record.size());
   }
   if (records.empty()) return;
-  take_tilts(std::move(tilts_deg), header);
+  if (std::ssize(records) < header.nz)
+    header.differences.push_back(
+        fmt::format("metadata of {} of its {} sections: their tilts are "
+                    "not taken",
+                    records.size(), header.nz));
+  else if (std::ssize(tilts_deg) == header.nz)
+    take_tilts(std::move(tilts_deg), header);
   const FeiRecord& first = records.front();
   if (const auto width_A = first.pixel_width_A())
     take_pixel_size(*width_A, first.pixel_height_A().value_or(*width_A), header);
-  constexpr base::Interval kVoltages_V{2e4, 3e6};
-  constexpr double kVolts_in_kV = 1e3;
-  if (const auto voltage = kVoltages_V.find(first.voltage_V().value_or(0.0)))
-    header.extended_voltage_kV = *voltage / kVolts_in_kV;
+  take_voltage(first.voltage_V().value_or(0.0), header);
   if (const auto axis_deg = first.axis_deg()) take_axis(*axis_deg, header);
   const auto of = [&](auto value) {
     return [&records, value](std::int64_t section) {
-      return (records[static_cast<std::size_t>(section)].*value)();
+      const auto at = static_cast<std::size_t>(section);
+      return at < records.size() ? (records[at].*value)() : std::nullopt;
     };
   };
-  constexpr double kSameAxis_deg = 1.0, kSameVoltage_V = 1.0;
-  note_difference("a tilt axis in degrees", of(&FeiRecord::axis_deg), kSameAxis_deg, header);
+  constexpr double kSameVoltage_V = 1.0;
+  note_difference(kAxisInDegrees, of(&FeiRecord::axis_deg), kSameAxis_deg, header);
   note_difference("a voltage in V", of(&FeiRecord::voltage_V), kSameVoltage_V, header);
   note_difference(kPixelsInA, of(&FeiRecord::pixel_width_A),
                   kSamePixel * std::fabs(first.pixel_width_A().value_or(0.0)), header);

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -7,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "expect_parts.h"
 #include "io/images/mrc.h"
 #include "scratch_directory.h"
 
@@ -47,6 +50,10 @@ TEST(Mrc, SeriTiltAngles) {
   EXPECT_TRUE(tilts("SERI", 6, 17).empty());      // records longer than the header
   EXPECT_TRUE(tilts("SERI", -4, 17).empty());
   EXPECT_TRUE(tilts("CCP4", 4, 17).empty());
+}
+
+std::string joined(const std::vector<std::string>& texts) {
+  return fmt::format("{}", fmt::join(texts, "; "));
 }
 
 // Puts a number into bytes as a file of this machine has it.
@@ -101,9 +108,20 @@ TEST(Mrc, FloatRecordsOfExtendedHeaders) {
   std::string mixed = float_records(0, 32, -86.25f, 3.5e-10f);
   put(mixed, 2 * 128 + 44, 7e-10f);
   const MrcHeader two_sizes = header_with_extended(mixed, no_type, 0, 32, "Fei Company");
-  EXPECT_EQ(two_sizes.extended_difference,
-            "pixels in Å of 7 in section 3, and of 3.5 in the first");
-  EXPECT_EQ(xplore.extended_difference, "");
+  EXPECT_EQ(two_sizes.differences,
+            std::vector<std::string>{
+                "pixels in Å of 7 in section 3, and of 3.5 in the first, which is taken"});
+  EXPECT_TRUE(xplore.differences.empty());
+  std::string turned = float_records(0, 32, -86.25f, 3.5e-10f);
+  put(turned, 128 + 40, -12.0f);
+  EXPECT_EQ(header_with_extended(turned, no_type, 0, 32, "Fei Company").differences,
+            std::vector<std::string>{
+                "a tilt axis in degrees of 12 in section 2, and of 86.25 in the first, which is "
+                "taken"});
+  const MrcHeader impossible =
+      header_with_extended(float_records(0, 32, 1000.0f, 3.5e-10f), no_type, 0, 32, "Fei Company");
+  ASSERT_EQ(impossible.differences.size(), 1u);
+  testing::expect_parts(impossible.differences[0], {"-1000°", "cannot be"});
   const MrcHeader few = header_with_extended(float_records(0, 4, 0, 0), no_type, 0, 4);
   EXPECT_EQ(few.extended_tilt_deg, tilts);
   EXPECT_EQ(few.voxel_size_A[0], 1.0);
@@ -139,11 +157,12 @@ TEST(Mrc, MagnificationsThatDifferByTheHeaderOfSerialEm) {
   const auto difference = [&](std::int16_t second) {
     const std::vector<std::int16_t> records{-6000, 330, 0, second, 6000, 330};
     const std::string extended(reinterpret_cast<const char*>(records.data()), 12);
-    return header_with_extended(extended, "SERI", 4, kTiltAndMagnification).extended_difference;
+    return joined(header_with_extended(extended, "SERI", 4, kTiltAndMagnification).differences);
   };
   EXPECT_EQ(difference(330), "");
-  EXPECT_EQ(difference(420),
-            "a magnification over 100 of 420 in section 2, and of 330 in the first");
+  EXPECT_EQ(
+      difference(420),
+      "a magnification over 100 of 420 in section 2, and of 330 in the first, which is taken");
 }
 
 TEST(Mrc, RecordsOfFei1) {
@@ -174,14 +193,15 @@ TEST(Mrc, RecordsOfFei1) {
   const auto difference = [&](std::size_t offset, double value) {
     std::string extended = records(768, kTilt | kAxis | kPixel | (1u << 5), "5.1");
     put(extended, 768 + offset, value);
-    return header_with_extended(extended, "FEI1", 0, 0).extended_difference;
+    return joined(header_with_extended(extended, "FEI1", 0, 0).differences);
   };
   EXPECT_EQ(difference(156, 3.51e-10), "");
-  EXPECT_EQ(difference(156, 7e-10), "pixels in Å of 7 in section 2, and of 3.5 in the first");
+  EXPECT_EQ(difference(156, 7e-10),
+            "pixels in Å of 7 in section 2, and of 3.5 in the first, which is taken");
   EXPECT_EQ(difference(84, 3e5),
-            "a voltage in V of 300000 in section 2, and of 200000 in the first");
+            "a voltage in V of 300000 in section 2, and of 200000 in the first, which is taken");
   EXPECT_EQ(difference(140, 3.0),
-            "a tilt axis in degrees of -3 in section 2, and of 86.25 in the first");
+            "a tilt axis in degrees of -3 in section 2, and of 86.25 in the first, which is taken");
   constexpr std::uint32_t kVoltage = 1u << 5, kPixelHeight = 1u << 15;
   const MrcHeader more = header_with_extended(
       records(768, kTilt | kPixel | kVoltage | kPixelHeight, "5.1"), "FEI1", 0, 0);
@@ -197,8 +217,18 @@ TEST(Mrc, RecordsOfFei1) {
   // Radians, of one version of the software.
   const MrcHeader radians = header_with_extended(records(768, kTilt, "4.4.0.4981"), "FEI1", 0, 0);
   EXPECT_TRUE(radians.extended_tilt_deg.empty());  // 60 radians are no tilt
-  const std::string cut = records(768, kTilt, "5.1").substr(0, 2 * 768);
-  EXPECT_TRUE(header_with_extended(cut, "FEI1", 0, 0).extended_tilt_deg.empty());
+  const std::string cut = records(768, kTilt | kAxis, "5.1").substr(0, 2 * 768);
+  const MrcHeader of_two = header_with_extended(cut, "FEI1", 0, 0);
+  EXPECT_TRUE(of_two.extended_tilt_deg.empty());
+  EXPECT_EQ(of_two.extended_axis_deg, 86.25);
+  testing::expect_parts(joined(of_two.differences), {"2 of its 3 sections"});
+  // Without tilts, before metadata of several megabytes, and with a voltage in kV.
+  std::string untilted = records(768, kAxis | kVoltage, "5.1") + std::string(17 << 20, '\0');
+  put(untilted, 84, 200.0);
+  const MrcHeader axis_alone = header_with_extended(untilted, "FEI1", 0, 0);
+  EXPECT_TRUE(axis_alone.extended_tilt_deg.empty());
+  EXPECT_EQ(axis_alone.extended_axis_deg, 86.25);
+  EXPECT_EQ(axis_alone.extended_voltage_kV, 200.0);
 }
 
 }  // namespace

@@ -410,6 +410,9 @@ std::optional<MrcFacts> find_mrc_facts(const std::filesystem::path& path, const 
 bool is_known_size(double size_A) { return size_A > 0.0 && size_A != 1.0; }
 
 double cubic_voxel_size_A(const MrcHeader& header, const std::filesystem::path& path) {
+  if (header.sections_a_volume > 0)
+    throw Error(fmt::format("'{}' is a stack of volumes (space group 401): give a file of one",
+                            path.string()));
   constexpr double kSame = 0.01;  // of calibrations
   const auto& [x_A, y_A, z_A] = header.voxel_size_A;
   const auto differs = [x = x_A](double side_A) {
@@ -421,6 +424,22 @@ double cubic_voxel_size_A(const MrcHeader& header, const std::filesystem::path& 
       fmt::format("'{}' has voxels of {:.6g} × {:.6g} × {:.6g} Å, and only cubes are read: correct "
                   "its header (IMOD's alterheader -del), or resample it",
                   path.string(), x_A, y_A, z_A));
+}
+
+std::optional<std::string> contradiction_of_mode(const MrcHeader& header) {
+  constexpr double kLargestByte = 127.0, kLargestShort = 32767.0;
+  const bool is_byte = header.mode == MrcMode::kInt8;
+  const bool has_sign = is_byte ? !header.bytes_are_unsigned : header.mode == MrcMode::kInt16;
+  const bool has_none = is_byte ? header.bytes_are_unsigned : header.mode == MrcMode::kUint16;
+  const bool is_too_large =
+      has_sign && header.max > (is_byte ? kLargestByte : kLargestShort) && header.max >= header.min;
+  const bool is_negative = has_none && header.min < 0.0 && header.max >= header.min;
+  if (!is_too_large && !is_negative) return std::nullopt;
+  return fmt::format(
+      "has {}-bit numbers with{} sign (mode {}), and its header states values from {:g} to {:g}: "
+      "those that do not fit are misread, so convert it (IMOD's newstack -mode 2)",
+      is_byte ? 8 : 16, is_too_large ? "" : "out a", static_cast<int>(header.mode), header.min,
+      header.max);
 }
 
 bool is_in_labels(const MrcHeader& header, std::string_view word) {

@@ -95,8 +95,14 @@ std::optional<MrcFacts> find_mrc_facts(const std::filesystem::path& path, const 
 bool is_known_size(double size_A);
 
 /// Returns the side of the voxels of a volume, or 0 if it is not known. The size along z counts for
-/// nothing in a stack of images where it is 0 or 1. Throws Error for voxels that are no cubes.
+/// nothing in a stack of images where it is 0 or 1. Throws Error for voxels that are no cubes, and
+/// for a stack of volumes.
 double cubic_voxel_size_A(const MrcHeader& header, const std::filesystem::path& path);
+
+/// Says of a file, as the rest of a sentence, that its header states values that its mode cannot
+/// hold: programs have written unsigned numbers as signed ones, and the other way round. Returns
+/// nothing if it does not.
+std::optional<std::string> contradiction_of_mode(const MrcHeader& header);
 
 /// Tells whether a label of a file has a word, such as the name of a program that has made it.
 /// `word` is in lower case; labels may be in any.

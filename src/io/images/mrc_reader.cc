@@ -46,7 +46,7 @@ struct MrcReader::Impl {
     constexpr std::int64_t kMostBytes = std::int64_t{1} << 24;
     const std::int64_t needed = records.bytes_per_section > 0
                                     ? records.bytes_per_section * header.nz
-                                    : header.extended_header_bytes;
+                                    : std::min(header.extended_header_bytes, kMostBytes);
     if (needed > kMostBytes) return;
     std::vector<std::byte> extended(static_cast<std::size_t>(needed));
     file.read_at(kMrcHeaderBytes, extended.data(), extended.size());

@@ -17,6 +17,7 @@
 
 #include "base/check.h"
 #include "io/saving/positioned_file.h"
+#include "io/tables/alignment_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -107,6 +108,7 @@ class TiffFile {
     TIFFGetField(handle_, TIFFTAG_PHOTOMETRIC, &format.photometric);
     TIFFGetFieldDefaulted(handle_, TIFFTAG_ORIENTATION, &format.orientation);
     format.is_tiled = TIFFIsTiled(handle_) != 0;
+    require_linear(page);
     read_pixel_size(format);
     require_readable(format, page);
     return format;
@@ -160,6 +162,17 @@ class TiffFile {
         "32 bits or floats of 32 bits can be read",
         format.samples, format.samples == 1 ? "value" : "values", format.bits, page + 1,
         is_integer ? "" : ", which are no whole numbers"));
+  }
+
+  // Throws Error for a curve that says which grey a value stands for (TIFF 6.0, page 84). libtiff
+  // passes the older GrayResponseCurve over.
+  void require_linear(std::size_t page) const {
+    std::array<std::uint16_t*, 3> curves{};
+    if (TIFFGetField(handle_, TIFFTAG_TRANSFERFUNCTION, &curves[0], &curves[1], &curves[2]) != 0)
+      fail(
+          fmt::format("has a curve of grey values (TransferFunction) on page {}, which is not "
+                      "applied: convert it without one",
+                      page + 1));
   }
 
   // Values may stand for colours of a palette, or count down from white (TIFF 6.0, page 37).
@@ -298,6 +311,7 @@ class TiffStack : public ImageStack {
     for (;;) {
       const PageFormat of_page = file.format(pages_.size());
       if (of_page != format_) refuse(file, of_page);
+      note_other_axis(file.description());
       pages_.push_back(TIFFCurrentDirOffset(file.handle()));
       if (pages_.size() > kMostPages) file.fail("has more pages than any tilt series");
       if (TIFFLastDirectory(file.handle()) != 0) break;
@@ -324,6 +338,17 @@ class TiffStack : public ImageStack {
   }
 
  private:
+  // Notes the first page whose title states another tilt axis than that of the first page.
+  void note_other_axis(const std::vector<std::string>& description) {
+    const std::vector<double> first = axes_of_labels(header_.labels),
+                              here = axes_of_labels(description);
+    if (first.empty() || here.empty() || !header_.differences.empty()) return;
+    if (are_two_axes(here.front(), first.front()))
+      header_.differences.push_back(fmt::format(
+          "a tilt axis of {:.6g}° on page {}, and of {:.6g}° on the first, which is taken",
+          here.front(), pages_.size() + 1, first.front()));
+  }
+
   // Refuses a page that is of another kind than the first.
   [[noreturn]] void refuse(const TiffFile& file, const PageFormat& page) const {
     const auto kind = [](const PageFormat& of) {

@@ -1,5 +1,7 @@
 #include "io/images/view_images.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include "expect_parts.h"
@@ -57,9 +59,12 @@ TEST(ViewImages, WhoseTiltAxesDifferSaySo) {
     return ImageInFile{.file = scratch / name, .section = {}};
   };
   const auto difference = [&](const char* second) {
-    return image_stack_of_files({image("a.mrc", "85.3"), image("b.mrc", second)}, "the images")
-        ->header()
-        .extended_difference;
+    return fmt::format(
+        "{}", fmt::join(image_stack_of_files({image("a.mrc", "85.3"), image("b.mrc", second)},
+                                             "the images")
+                            ->header()
+                            .differences,
+                        "; "));
   };
   EXPECT_EQ(difference("85"), "");
   expect_parts(difference("12"), {"a tilt axis in degrees of 12 in", "b.mrc", "85.3"});

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -57,12 +58,14 @@ Gaussian cube_at(const base::Volume& map, const std::array<std::int64_t, 3>& fir
 std::vector<Gaussian> read_density(const std::filesystem::path& path) {
   const base::Volume map = evaluate::read_volume(path);
   const double voxel_A = map.voxel_size_A;
+  evaluate::require_numbers(map, path);
   if (!io::is_known_size(voxel_A))
     throw Error(fmt::format("'{}' has no voxel size: set that of its header", path.string()));
   double solvent = 0.0;
   const double unit_V = potential_of_unit(map, path, solvent);
-  const auto side = std::max<std::int64_t>(1, std::llround(kCube_A / voxel_A));
   const base::Shape3& n = map.shape;
+  const auto side = std::clamp<std::int64_t>(std::llround(kCube_A / voxel_A), 1,
+                                             std::max({n.nx, n.ny, n.nz}));
   const Vector3 middle{static_cast<double>(n.nx) / 2.0 - 0.5, static_cast<double>(n.ny) / 2.0 - 0.5,
                        static_cast<double>(n.nz) / 2.0 - 0.5};
   std::vector<Gaussian> gaussians;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "io/images/mrc.h"
 #include "scratch_directory.h"
@@ -61,6 +62,9 @@ TEST(DensityFile, RefusesMapsWithoutDensityOrVoxelSize) {
   const testing::ScratchDirectory scratch;
   EXPECT_THROW(read_density(write_ball(scratch / "dark.mrc", 30.0, -1.0f, 0.0f)), Error);
   EXPECT_THROW(read_density(write_ball(scratch / "bare.mrc", 30.0, 1.0f, 0.0f, 0.0)), Error);
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()})
+    EXPECT_THROW(read_density(write_ball(scratch / "bad.mrc", 8.0, bad, 0.0f)), Error);
 }
 
 }  // namespace

@@ -243,8 +243,25 @@ class Builder {
           "two kinds of particles have the name '{}': rename the file '{}', whose name is that of "
           "its particles",
           name, file.path.string()));
-    specimen_.kinds.push_back({name, read_density(file.path)});
+    std::vector<Gaussian> density = read_density(file.path);
+    require_size(density, file.path);
+    specimen_.kinds.push_back({name, std::move(density)});
     return specimen_.kinds.size() - 1;
+  }
+
+  // Throws Error for a particle that is larger than the field of view, or of less than a voxel.
+  void require_size(std::span<const Gaussian> density, const std::filesystem::path& file) const {
+    double sigma_A = 0.0;
+    for (const Gaussian& gaussian : density) sigma_A = std::max(sigma_A, gaussian.sigma_A);
+    const double width_A = 2.0 * (radius_A(density) + sigma_A);
+    const base::Shape3& shape = specimen_.phantom.shape;
+    const double field_A = voxel_size_A_ * static_cast<double>(std::min(shape.nx, shape.ny));
+    const double least_A = voxel_size_A_ / 4.0;
+    if (width_A >= least_A && width_A <= field_A) return;
+    throw Error(fmt::format(
+        "'{}' is a particle of {:.4g} Å, and one from {:g} Å, a quarter of a voxel, to {:g} Å, the "
+        "field of view, can be seen: correct the voxel size of its header",
+        file.string(), width_A, least_A, field_A));
   }
 
   // Adds a particle if it touches nothing and lies within the slab.
