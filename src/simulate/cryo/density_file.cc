@@ -64,8 +64,8 @@ std::vector<Gaussian> read_density(const std::filesystem::path& path) {
   double solvent = 0.0;
   const double unit_V = potential_of_unit(map, path, solvent);
   const base::Shape3& n = map.shape;
-  const auto side = std::clamp<std::int64_t>(std::llround(kCube_A / voxel_A), 1,
-                                             std::max({n.nx, n.ny, n.nz}));
+  const auto side =
+      std::clamp<std::int64_t>(std::llround(kCube_A / voxel_A), 1, std::max({n.nx, n.ny, n.nz}));
   const Vector3 middle{static_cast<double>(n.nx) / 2.0 - 0.5, static_cast<double>(n.ny) / 2.0 - 0.5,
                        static_cast<double>(n.nz) / 2.0 - 0.5};
   std::vector<Gaussian> gaussians;
