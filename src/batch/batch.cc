@@ -96,7 +96,7 @@ void require_room(const std::vector<Job>& jobs, const Room& room) {
 void begin_batch(const fs::path& folder, const JobList& list) {
   warn_of_waiting_tasks(folder, list);
   fs::create_directories(log_folder(folder));
-  write_jobs(list_of(folder), list);
+  // The list comes last: with it, results that a state calls done are those of this batch.
   for (const Job& job : list.jobs) {
     State state = read_state(folder, job);
     // A job that a stopped batch had begun, and that replaces results, goes on from its checkpoint.
@@ -107,6 +107,7 @@ void begin_batch(const fs::path& folder, const JobList& list) {
     state.reason.clear();
     write_state(folder, job, state);
   }
+  write_jobs(list_of(folder), list);
   write_summary(folder, list.jobs);
 }
 

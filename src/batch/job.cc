@@ -93,7 +93,7 @@ std::string reason_in_batch(const std::string& said, const fs::path& output) {
 std::optional<fs::file_time_type> last_progress(const fs::path& output) {
   const output::OutputPaths paths = output::output_paths(output);
   std::optional<fs::file_time_type> last;
-  for (const fs::path& file : {paths.model, paths.trials}) {
+  for (const fs::path& file : {paths.model, paths.trials, paths.tiles, paths.alignment}) {
     std::error_code error;
     const fs::file_time_type written = fs::last_write_time(file, error);
     if (!error) last = std::max(last.value_or(written), written);

@@ -180,7 +180,9 @@ fs::path output_of(const Series& series, const fs::path& folder) {
 std::vector<std::string> command_of(const Series& series, const std::vector<GivenOption>& common) {
   std::vector<std::string> words{"reconstruct", base::file_word(series.input.string())};
   for (const GivenOption& option : common) {
-    if (std::ranges::find(series.options, option.flag, &GivenOption::flag) == series.options.end())
+    if (std::ranges::find(series.options, option.flag, &GivenOption::flag) ==
+            series.options.end() &&
+        std::ranges::find(series.left_out, option.flag) == series.left_out.end())
       words.push_back(option_for(series, option, option.flag).word());
   }
   for (const GivenOption& option : series.options)

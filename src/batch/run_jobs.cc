@@ -6,6 +6,7 @@
 #include <csignal>
 #include <memory>
 
+#include "base/log.h"
 #include "batch/summary.h"
 #include "tomofield/error.h"
 
@@ -14,8 +15,29 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Keeps the state of a job that has ended. One that cannot be written must not stop the others.
+void write_state_or_warn(const fs::path& folder, const Job& job, const State& state) {
+  try {
+    write_state(folder, job, state);
+  } catch (const Error& error) {
+    base::log_warning(fmt::format("the state of '{}' is not kept: {}", job.name, error.what()));
+  }
+}
+
 bool was_stopped(int status) {  // with a checkpoint
   return status == 128 + SIGTERM || status == 128 + SIGINT || status == 128 + SIGHUP;
+}
+
+// Starts the run of a job. One that cannot start fails alone: returns null then.
+std::unique_ptr<RunningJob> begin_job(const RunOptions& options, const Job& job, int threads) {
+  try {
+    return std::make_unique<RunningJob>(options, job, threads);
+  } catch (const Error& error) {
+    const State failed{.progress = Progress::kFailed, .reason = error.what(), .costs = {}};
+    write_state_or_warn(options.folder, job, failed);
+    options.job_ends(job, failed);
+    return nullptr;
+  }
 }
 
 }  // namespace
@@ -62,7 +84,7 @@ bool RunningJob::has_ended() {
     state.reason = base::reason_of_failure(result->exit_status, log_of(options_->folder, *job_));
     if (!job_->replaces) state.reason = reason_in_batch(state.reason, job_->output);
   }
-  write_state(options_->folder, *job_, state);
+  write_state_or_warn(options_->folder, *job_, state);
   return true;
 }
 
@@ -83,9 +105,11 @@ bool run_jobs(const RunOptions& options, const std::vector<Job>& jobs, const Roo
     for (const Start& start : starts) {
       const Job& job = jobs[start.job];
       options.job_starts(job, start.threads);
-      running.push_back(std::make_unique<RunningJob>(options, job, start.threads));
       std::erase(waiting, start.job);
-      take(job, start.threads, 1);
+      if (auto begun = begin_job(options, job, start.threads)) {
+        running.push_back(std::move(begun));
+        take(job, start.threads, 1);
+      }
     }
     if (!starts.empty()) write_summary(options.folder, jobs);
     if (is_stopped)

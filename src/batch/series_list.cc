@@ -145,7 +145,10 @@ std::string add_option(const Column& column, const std::string& cell, Series& se
   if (!is_given)
     return fmt::format("{} takes no value: the cell must be true, false or empty, not '{}'", flag,
                        io::quote(cell));
-  if (*is_given) series.options.push_back({flag, std::nullopt});
+  if (*is_given)
+    series.options.push_back({flag, std::nullopt});
+  else
+    series.left_out.push_back(flag);
   return {};
 }
 

@@ -23,6 +23,7 @@ struct Series {
   std::filesystem::path input;   ///< what `reconstruct` takes
   std::filesystem::path output;  ///< the tomogram; empty: NAME.mrc in the folder of the batch
   std::vector<option_table::GivenOption> options;  ///< of this series alone
+  std::vector<std::string> left_out{};  ///< flags of the command line that it does not have
   bool is_tomogram = false;  ///< a row of RELION's table, whose name --series states as it is
 };
 

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -87,6 +88,13 @@ Script name_for_sbatch(const fs::path& path, std::string_view advice) {
 
 // Returns an option of the user for sbatch, which is one line of the script.
 Script line_for_sbatch(const std::string& option) {
+  constexpr std::array<std::string_view, 13> kOwn{
+      "--array", "-a",       "--ntasks", "-n",          "--chdir",    "-D",          "--output",
+      "-o",      "--signal", "--wrap",   "--test-only", "--parsable", "--dependency"};
+  const std::string_view name = std::string_view(option).substr(0, option.find_first_of("= "));
+  if (std::ranges::find(kOwn, name) != kOwn.end())
+    throw Error(fmt::format("--sbatch {}: the batch sets {} itself, so leave it out",
+                            io::quote(option), io::quote(name)));
   if (std::ranges::none_of(option, [](unsigned char c) { return c < ' ' || c == 0x7f; }))
     return Script::made(option);
   throw Error(

@@ -126,8 +126,9 @@ void add_pictures(const CompareOptions& options, const std::vector<Row>& rows,
 void add_commands(const std::vector<Row>& rows, report::HtmlPage& page) {
   std::string listing;
   for (const Row& row : rows) {
-    listing += fmt::format("tomofield {} -o {}\n", fmt::join(row.run.command, " "),
-                           row.volume.filename().string());
+    std::vector<std::string> words = row.run.command;
+    words.insert(words.end(), {"-o", row.volume.filename().string()});
+    listing += shell_command(words) + "\n";
   }
   page.add_heading("Commands");
   page.add_listing(listing);

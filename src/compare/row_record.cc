@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "base/code_text.h"
 #include "base/plausible.h"
 #include "base/utf8.h"
 #include "io/json.h"
@@ -18,7 +19,7 @@ constexpr const char* kAdvice =
     "give another folder with -o, or --overwrite to make everything in this one again";
 
 std::string command_text(const std::vector<std::string>& command) {
-  return fmt::format("`tomofield {}`", fmt::join(command, " "));
+  return fmt::format("`{}`", shell_command(command));
 }
 
 json to_json(Progress progress) {
@@ -124,6 +125,12 @@ void write_row(const fs::path& file, const RunOrigin& origin, const RowState& st
                         {"core_seconds", state.costs.core_seconds},
                         {"wall_seconds", state.costs.wall_seconds},
                         {"peak_bytes", state.costs.peak_bytes}});
+}
+
+std::string shell_command(const std::vector<std::string>& words) {
+  std::string command = "tomofield";
+  for (const std::string& word : words) command += " " + base::Shell::quoted_if_needed(word);
+  return command;
 }
 
 }  // namespace tomofield::compare

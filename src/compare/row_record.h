@@ -53,4 +53,7 @@ std::string not_of_this_comparison(const std::filesystem::path& file, const std:
 RowState read_row(const std::filesystem::path& file, const RunOrigin& origin);
 void write_row(const std::filesystem::path& file, const RunOrigin& origin, const RowState& state);
 
+/// Returns a command of the program as a person can give it to a shell: "tomofield baseline wbp …".
+std::string shell_command(const std::vector<std::string>& words);
+
 }  // namespace tomofield::compare

@@ -67,8 +67,8 @@ bool run(const fs::path& program, const RunHooks& hooks, Row& row) {
   keep(has_ended ? Progress::kFinished : Progress::kStopped, before + result.costs);
   if (has_ended || hooks.must_stop()) return has_ended;
   throw Error(fmt::format("{} failed with status {}: {} (all that it said is in '{}')",
-                          row.run.name, result.exit_status, base::reason_of_failure(log),
-                          log.string()));
+                          row.run.name, result.exit_status,
+                          base::reason_of_failure(result.exit_status, log), log.string()));
 }
 
 }  // namespace

@@ -34,8 +34,10 @@ evaluate::VolumePair pair_of(const Tomogram& first, const char* first_name, cons
         fmt::format("the {} has {} × {} × {} voxels and the {} {} × {} × {}: cut both to one size",
                     first_name, first.size[0], first.size[1], first.size[2], second_name,
                     second.size[0], second.size[1], second.size[2]));
-  evaluate::require_one_voxel_size(fmt::format("the {}", first_name), first.voxel_size_A,
-                                   fmt::format("the {}", second_name), second.voxel_size_A);
+  const double voxel_A =
+      evaluate::common_voxel_size_A(fmt::format("the {}", first_name), first.voxel_size_A,
+                                    fmt::format("the {}", second_name), second.voxel_size_A);
+  pair.first.voxel_size_A = pair.second.voxel_size_A = voxel_A;
   return pair;
 }
 
@@ -55,11 +57,11 @@ VolumeScores score_volume(const Tomogram& volume, const Tomogram& truth) {
 
 ShellCorrelation correlate_shells(const Tomogram& first, const Tomogram& second) {
   const auto pair = pair_of(first, "first volume", second, "second volume");
-  if (!(second.voxel_size_A > 0.0))
+  if (!(pair.second.voxel_size_A > 0.0))
     throw Error(
-        fmt::format("the second volume's voxel size of {} Å is not a positive number, so its "
-                    "frequencies have no scale",
-                    second.voxel_size_A));
+        fmt::format("the volumes' voxel size of {} Å is not a positive number, so frequencies have "
+                    "no scale",
+                    pair.second.voxel_size_A));
   evaluate::Fsc fsc = evaluate::fourier_shell_correlation(
       pair.first, pair.second, evaluate::edge_window(pair.second.shape), std::nullopt);
   return {.frequency_per_A = std::move(fsc.frequency_per_A),

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "base/threads/parallel.h"
 #include "base/utf8.h"
 #include "evaluate/box.h"
+#include "evaluate/volume_pair.h"
 #include "io/saving/scratch_memory.h"
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
@@ -129,6 +131,22 @@ void check_volume(const base::Volume& volume, const measurement::Measurement& se
   }
 }
 
+// Throws Error if a volume of tomofield states another place than the region of the views.
+void require_place(const std::filesystem::path& path, const measurement::Measurement& series) {
+  const auto place = place_A(io::MrcReader(path));
+  if (!place) return;
+  const std::array<std::int64_t, 2> corner{series.roi.x0, series.roi.y0};
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const double stated_px = (*place)[axis] / series.pixel_size_A;
+    if (std::fabs(stated_px - static_cast<double>(corner[axis])) < 0.5) continue;
+    throw Error(
+        fmt::format("'{}' begins at {:.4g}, {:.4g} pixels of the views (ORIGIN), and the region at "
+                    "{}, {}: give the --roi that it was made with",
+                    path.string(), (*place)[0] / series.pixel_size_A,
+                    (*place)[1] / series.pixel_size_A, corner[0], corner[1]));
+  }
+}
+
 std::vector<int> scored_views(const geometry::TiltGeometry& geometry, int hold_out) {
   if (hold_out > 0) return measurement::held_out_views(geometry.tilt_deg, hold_out);
   std::vector<int> all(static_cast<std::size_t>(geometry.num_views()));
@@ -171,6 +189,7 @@ VolumeScore score_volume(const VolumeScoreOptions& options) {
                          fmt::format("the series '{}'", options.input.stack.string()),
                          plan.pixel_size_A);
   check_volume(volume, plan, options.volume);
+  require_place(options.volume, plan);
   measurement::Measurement prepared =
       measurement::prepare_measurement(series, specimen, io::scratch_directory({}));
   keep_beads(prepared);  // all volumes are scored on the same rays

@@ -18,32 +18,45 @@ std::string to_text(const VolumeSizes& sizes) {
   return fmt::format("{} × {} × {}", sizes[0], sizes[1], sizes[2]);
 }
 
-void check_voxel_sizes(const io::MrcReader& first, const io::MrcReader& second) {
-  const double a = io::cubic_voxel_size_A(first.header(), first.path()),
-               b = io::cubic_voxel_size_A(second.header(), second.path());
-  if (std::abs(a - b) <= 1e-4 * std::abs(b)) return;
-  const auto quoted = [](const io::MrcReader& volume) {
-    return fmt::format("'{}'", volume.path().string());
-  };
-  require_one_voxel_size(quoted(first), a, quoted(second), b);
-  base::log_warning(
-      fmt::format("the voxel sizes differ ({:.6g} Å and {:.6g} Å): compared voxel by "
-                  "voxel all the same",
-                  a, b));
+std::string quoted(const io::MrcReader& volume) {
+  return fmt::format("'{}'", volume.path().string());
+}
+
+double common_voxel_size_A(const io::MrcReader& first, const io::MrcReader& second) {
+  return evaluate::common_voxel_size_A(
+      quoted(first), io::cubic_voxel_size_A(first.header(), first.path()), quoted(second),
+      io::cubic_voxel_size_A(second.header(), second.path()));
 }
 
 // The voxel of `b` on which the first voxel of `a` lies.
 using Offset = std::array<std::int64_t, 3>;
 
-bool is_ours(const io::MrcReader& volume) {
-  return std::ranges::any_of(volume.header().labels, [](const std::string& label) {
-    return label.starts_with("tomofield");
-  });
+bool is_turned(const io::MrcReader& volume) {
+  return std::ranges::count(volume.header().labels, io::kLabelOfTurnedBox) > 0;
+}
+
+// Warns of a volume that has no place, because it was turned.
+void warn_of_turned(const io::MrcReader& volume) {
+  base::log_warning(fmt::format(
+      "'{}' was turned before it was sampled, so its ORIGIN is not its place: it is laid on the "
+      "middle of the other volume",
+      volume.path().string()));
+}
+
+[[noreturn]] void throw_between_voxels(const io::MrcReader& a, const io::MrcReader& b,
+                                       double voxels) {
+  throw Error(
+      fmt::format("'{}' begins {:.4g} voxels after '{}' (ORIGIN), which is no whole number: sample "
+                  "both at the same places",
+                  b.path().string(), voxels, a.path().string()));
 }
 
 // Returns the offset by the ORIGINs if they make one volume a part of the other.
 // Otherwise they say nothing: many programs write other things there, and most nothing.
 std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcReader& b) {
+  for (const io::MrcReader* volume : {&a, &b})
+    if (is_turned(*volume)) return warn_of_turned(*volume), std::nullopt;
+  const bool are_ours = place_A(a) && place_A(b);
   const VolumeSizes size_a = whole_box(a).end, size_b = whole_box(b).end;
   Offset offset{};
   bool lies_in_b = true, lies_in_a = true;
@@ -51,12 +64,15 @@ std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcRead
     const double voxel_A = b.header().voxel_size_A[axis];
     const double voxels =
         (a.header().origin_A[axis] - b.header().origin_A[axis]) / (voxel_A > 0 ? voxel_A : 1.0);
-    if (!(std::abs(voxels) < 1e6) || std::abs(voxels - std::round(voxels)) > 0.01) return {};
+    if (!(std::abs(voxels) < 1e6)) return {};
+    if (std::abs(voxels - std::round(voxels)) > 0.01) {
+      if (are_ours) throw_between_voxels(a, b, -voxels);
+      return {};
+    }
     offset[axis] = std::llround(voxels);
     lies_in_b = lies_in_b && offset[axis] >= 0 && offset[axis] + size_a[axis] <= size_b[axis];
     lies_in_a = lies_in_a && offset[axis] <= 0 && offset[axis] + size_a[axis] >= size_b[axis];
   }
-  const bool are_ours = is_ours(a) && is_ours(b);
   if (are_ours && size_a == size_b && offset != Offset{})
     throw Error(fmt::format(
         "'{}' and '{}' are of two places of one volume: the latter begins {}, {}, {} voxels after "
@@ -131,6 +147,35 @@ void require_one_voxel_size(const std::string& first, double first_A, const std:
         first_A, second, second_A));
 }
 
+double common_voxel_size_A(const std::string& first, double first_A, const std::string& second,
+                           double second_A) {
+  require_one_voxel_size(first, first_A, second, second_A);
+  const bool is_known = io::is_known_size(second_A) || !io::is_known_size(first_A);
+  const double common_A = is_known ? second_A : first_A;
+  if (std::abs(first_A - second_A) > 1e-4 * std::abs(second_A))
+    base::log_warning(fmt::format(
+        "the voxel sizes differ ({:.6g} Å and {:.6g} Å): compared voxel by voxel all the same, "
+        "with voxels of {:.6g} Å",
+        first_A, second_A, common_A));
+  return common_A;
+}
+
+std::optional<std::array<double, 3>> place_A(const io::MrcReader& volume) {
+  const bool is_ours = std::ranges::any_of(volume.header().labels, [](const std::string& label) {
+    return label.starts_with("tomofield");
+  });
+  return is_ours && !is_turned(volume) ? std::optional(volume.header().origin_A) : std::nullopt;
+}
+
+void require_whole(const std::filesystem::path& path) {
+  const io::MrcReader volume(path);
+  const auto place = place_A(volume);
+  if (!is_turned(volume) && (!place || *place == std::array{0.0, 0.0, 0.0})) return;
+  throw Error(fmt::format("'{}' is {}, and the list has positions in the whole volume: give that",
+                          path.string(),
+                          is_turned(volume) ? "a turned box" : "a part of a volume (ORIGIN)"));
+}
+
 bool have_axes_in_another_order(const VolumeSizes& first, const VolumeSizes& second) {
   return first != second && std::ranges::is_permutation(first, second);
 }
@@ -144,6 +189,7 @@ bool share_half(const VolumeSizes& first, const VolumeSizes& second) {
 VolumePair read_pair(const std::filesystem::path& first, const std::filesystem::path& second,
                      const std::optional<base::Box>& box) {
   const io::MrcReader a(first), b(second);
+  const double voxel_A = common_voxel_size_A(a, b);
   const std::optional<Offset> part = offset_by_origin(a, b);
   const Offset offset = part.value_or(offset_by_centres(a, b));
   const base::Box common = common_box(a, b, offset);
@@ -155,7 +201,6 @@ VolumePair read_pair(const std::filesystem::path& first, const std::filesystem::
   } else {
     check_sizes(a, b);
   }
-  check_voxel_sizes(a, b);
   if (box) check_box(*box, common, b);
   const base::Box in_second = box.value_or(common);
   base::Box in_first = in_second;
@@ -163,7 +208,9 @@ VolumePair read_pair(const std::filesystem::path& first, const std::filesystem::
     in_first.begin[axis] -= offset[axis];
     in_first.end[axis] -= offset[axis];
   }
-  return {read_box(a, in_first), read_box(b, in_second), in_second};
+  VolumePair pair{read_box(a, in_first), read_box(b, in_second), in_second};
+  pair.first.voxel_size_A = pair.second.voxel_size_A = voxel_A;
+  return pair;
 }
 
 }  // namespace tomofield::evaluate

@@ -22,6 +22,19 @@ void require_one_voxel_size(const std::string& first, double first_A, const std:
                             double second_A);
 constexpr double kMaxScaleDifference = 0.05;  ///< for read_pair()
 
+/// Returns the voxel size (Å) of two volumes that are compared voxel by voxel: the known one, or 0.
+/// Warns if they differ, and throws Error as require_one_voxel_size() does.
+double common_voxel_size_A(const std::string& first, double first_A, const std::string& second,
+                           double second_A);
+
+/// Returns where the corner of a volume lies in the whole in Å, along its axes, if tomofield wrote
+/// it and did not turn it: its ORIGIN.
+std::optional<std::array<double, 3>> place_A(const io::MrcReader& volume);
+
+/// Throws Error if a volume is a part of another one, as its place says, or was turned: positions
+/// in the whole are not its own.
+void require_whole(const std::filesystem::path& volume);
+
 /// Returns true if the axes of one of two volumes, which read_pair() would lay centre on centre,
 /// are in another order than the other's.
 bool have_axes_in_another_order(const VolumeSizes& first, const VolumeSizes& second);
@@ -45,8 +58,9 @@ struct VolumePair {
 /// voxels of the second, restricts the common box further.
 ///
 /// Throws Error for volumes that cannot be meant for each other: axes in another order, voxel sizes
-/// more than 5 % apart, or, laid centre on centre, less than half of one in the other along some
-/// axis. Throws Error for a box that is empty or not within the common one.
+/// more than 5 % apart, two places of one volume that tomofield wrote, or, laid centre on centre,
+/// less than half of one in the other along some axis. Throws Error for a box that is empty or not
+/// within the common one.
 VolumePair read_pair(const std::filesystem::path& first, const std::filesystem::path& second,
                      const std::optional<base::Box>& box);
 

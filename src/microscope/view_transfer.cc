@@ -29,10 +29,10 @@ DefocusSlope slope_of_tilt(double tilt_deg, double pixel_size_A, DefocusHand han
 }
 
 double spread_px(const ViewTransfer& transfer) {
-  constexpr double kAngstroms_in_mm = 1e7;
+  constexpr double kMillimetre_A = 1e7;
   const double wavelength_A = electron_wavelength_A(transfer.optics.voltage_kV);
   const double cubic =
-      transfer.optics.spherical_aberration_mm * kAngstroms_in_mm * std::pow(wavelength_A, 3);
+      transfer.optics.spherical_aberration_mm * kMillimetre_A * std::pow(wavelength_A, 3);
   const double finest = 1.0 / (2.0 * transfer.pixel_size_A);
   double largest_A = 0.0;
   for (const double defocus_A : {transfer.defocus.u_A, transfer.defocus.v_A}) {

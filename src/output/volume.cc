@@ -256,6 +256,7 @@ void write_voxels(const VoxelSource& source, const OrientedBox& box, const Model
   spec.voxel_size_A.fill(box.voxel_px * info.pixel_size_A);
   spec.origin_A = origin_A(info, box, options.axes);
   spec.labels = volume_labels(info, made_by);
+  if (!box.is_aligned()) spec.labels.emplace_back(io::kLabelOfTurnedBox);
 
   if (options.zarr) processes.run_collectively([&] { require_room_for_both(path, spec); });
 

@@ -55,16 +55,21 @@ double part_of_parameters(const fit::Domain& domain, FieldKind kind,
 }
 
 // Returns the part of all parameters that belongs to leaves that rays meet. Their gradient and
-// moments take memory; those of other leaves are never written.
+// moments take memory; those of other leaves are never written, and those of small ones share their
+// pages with others (base::AlignedBuffer).
 double part_that_rays_meet(const fit::Domain& domain, FieldKind kind) {
+  constexpr std::size_t kSmallLeaf = std::size_t{8} << 20;  // a few huge pages
   std::vector<field::LeafShape> met;
   for (int i = 0; i < domain.tree.num_leaves(); ++i) {
     const field::Square& square = domain.tree.leaf(i).square;
-    if (static_cast<double>(square.x0) < domain.support.x1 &&
-        static_cast<double>(square.x1()) > domain.support.x0 &&
-        static_cast<double>(square.y0) < domain.support.y1 &&
-        static_cast<double>(square.y1()) > domain.support.y0)
-      met.push_back(domain.shapes[static_cast<std::size_t>(i)]);
+    const field::LeafShape& shape = domain.shapes[static_cast<std::size_t>(i)];
+    const bool meets_rays =
+        static_cast<double>(square.x0)<domain.support.x1&& static_cast<double>(square.x1())> domain
+            .support.x0 &&
+        static_cast<double>(square.y0)<domain.support.y1&& static_cast<double>(square.y1())> domain
+            .support.y0;
+    if (meets_rays || field::count_parameters(kind, {shape}) * sizeof(float) < kSmallLeaf)
+      met.push_back(shape);
   }
   return static_cast<double>(field::count_parameters(kind, met)) /
          static_cast<double>(field::count_parameters(kind, domain.shapes));

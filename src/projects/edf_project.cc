@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "io/tables/text_lines.h"
 #include "projects/formats.h"
 #include "projects/stacks.h"
+#include "projects/transfer_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::projects {
@@ -39,6 +41,12 @@ Entries read_entries(const fs::path& edf) {
 std::string value_of(const Entries& entries, std::string_view name) {
   const auto found = entries.find(name);
   return found == entries.end() ? std::string() : found->second;
+}
+
+// Returns the value of an option that the project has set, or an empty text.
+std::string setting_of(const Project& project, std::string_view option) {
+  const auto found = std::ranges::find(project.settings(), option, &Setting::option);
+  return found == project.settings().end() ? std::string() : found->value;
 }
 
 // Returns the first of the files NAME + ending that is there.
@@ -93,7 +101,8 @@ void set_pixel_size(Project& project, const fs::path& edf, const Entries& entrie
   constexpr const char* kEntry = "Setup.PixelSize";
   constexpr double kAngstroms_in_nm = 10.0;
   const std::string text = value_of(entries, kEntry);
-  if (text.empty() || project.ignores(kEntry)) return;
+  if (text.empty() || project.ignores(kEntry) || !setting_of(project, "--pixel-size").empty())
+    return;
   const auto size_nm = io::parse_number(text);
   if (!size_nm)
     throw Error(fmt::format(
@@ -148,6 +157,10 @@ void set_dataset(Project& project, const fs::path& edf, const Entries& entries,
       project.warn(fmt::format(
           "'{}': {} names '{}', which is not applied (--ignore {} says that this is meant)",
           edf.string(), entry, io::quote(file), entry));
+  const bool has_defocus = set_transfer_files(project, edf.parent_path(), name);
+  set_imod_optics(project, edf.parent_path() / "tilt.com",
+                  {.in_header_A = io::open_image_stack(*stack)->header().voxel_size_A[0]},
+                  has_defocus || project.request().has_transfer);
   set_pixel_size(project, edf, entries, *stack);
   if (const fs::path xtilt = stem.string() + ".xtilt"; is_file(xtilt))
     project.set("--xtilt", xtilt.string(), edf, kEntry);
@@ -162,6 +175,9 @@ void read_edf_project(Project& project) {
   if (is_file(tilt)) {
     project.add_file(tilt);
     read_imod_project(project, tilt);
+    // The size is that of the raw stack.
+    if (!setting_of(project, "--xf").empty())
+      set_pixel_size(project, edf, entries, setting_of(project, "stack"));
     return compare_axis(project, edf, entries);
   }
   const std::string name = value_of(entries, "Setup.DatasetName");

@@ -65,22 +65,25 @@ bool set_views(Project& project, const fs::path& views, const fs::path& named_by
   const io::ViewTable table = io::read_view_table(views);
   for (const io::ImageInFile& image : io::find_view_images(table)) project.add_file(image.file);
   project.set("stack", views.string(), named_by, entry, row.name);
-  if (!io::has_defocus(table)) {
+  const bool has_defocus = io::has_defocus(table);
+  if (has_defocus)
+    project.set("--ctf", views.string(), views, "rlnDefocusU");
+  else
     warn_of_unused_transfer(project, table);
-    return false;
-  }
-  project.set("--ctf", views.string(), views, "rlnDefocusU");
-  set_hand(project, table, row, named_by);
-  return true;
+  if (has_defocus || project.request().has_transfer) set_hand(project, table, row, named_by);
+  return has_defocus;
 }
 
-// Sets what the row of a tomogram says of the microscope.
-void set_optics(Project& project, const io::RelionTomogram& tomogram, const fs::path& star) {
+// Sets what the row of a tomogram says of the microscope: the voltage, on which a dose depends,
+// too, and the rest beside a contrast transfer.
+void set_optics(Project& project, const io::RelionTomogram& tomogram, const fs::path& star,
+                bool has_transfer) {
   const auto set = [&](std::string_view option, std::string_view column,
                        const std::optional<double>& value) {
     if (value) project.set(option, fmt::format("{}", *value), star, column);
   };
   set("--voltage", "rlnVoltage", tomogram.optics.voltage_kV);
+  if (!has_transfer) return;
   set("--cs", "rlnSphericalAberration", tomogram.optics.spherical_aberration_mm);
   set("--amplitude-contrast", "rlnAmplitudeContrast", tomogram.optics.amplitude_contrast);
 }
@@ -130,8 +133,9 @@ void read_relion_project(Project& project) {
   const fs::path views = io::find_listed_file(tomogram.tilt_series_star, star);
   for (const io::RelionTomogram& other : tomograms) add_table_of(project, other, star);
   const bool has_transfer = set_views(project, views, star, "rlnTomoTiltSeriesStarFile", tomogram);
-  if (has_transfer) set_optics(project, tomogram, star);
-  if (has_transfer || project.request().has_transfer) set_detector(project, tomogram, star);
+  const bool may_transfer = has_transfer || project.request().has_transfer;
+  set_optics(project, tomogram, star, may_transfer);
+  if (may_transfer) set_detector(project, tomogram, star);
   for (const std::string& what : tomogram.not_applied)
     project.warn(fmt::format("'{}', tomogram {}: {}, which is not applied", star.string(),
                              tomogram.name, what));

@@ -103,7 +103,7 @@ void warn_of_other_size(const io::Mdoc& mdoc, const std::filesystem::path& path,
 // Warns of titles among the labels that state no axis that can be, or another one than the extended
 // header does.
 void warn_of_titles(const TiltSeriesOptions& options, const io::ImageStack& stack) {
-  constexpr double kSame_deg = 10.0;
+  constexpr double kSameAxis_deg = 10.0;
   const io::MrcHeader& header = stack.header();
   if (options.tilt_axis_deg) return;
   for (const std::string& label : header.labels) {
@@ -116,7 +116,7 @@ void warn_of_titles(const TiltSeriesOptions& options, const io::ImageStack& stac
           "--tilt-axis",
           stack.name(), io::quote(*word)));
     else if (header.extended_axis_deg &&
-             angle_between_axes(*axis_deg, *header.extended_axis_deg) > kSame_deg)
+             angle_between_axes(*axis_deg, *header.extended_axis_deg) > kSameAxis_deg)
       base::log_warning(fmt::format(
           "a label of '{}' states a tilt axis of {:.6g}°, and its extended header one of {:.6g}°: "
           "give the right one with --tilt-axis",

@@ -112,6 +112,7 @@ void find_membranes(const EvaluateArguments& arguments, Findings& findings) {
 }
 
 void find_particles(const EvaluateArguments& arguments, Findings& findings) {
+  evaluate::require_whole(arguments.volume);
   const base::Volume volume = evaluate::read_volume(arguments.volume);
   std::vector<evaluate::PickScore> scores;
   for (const auto& particle : evaluate::read_particles(*arguments.particles)) {

@@ -11,6 +11,7 @@
 #include "evaluate/matching/detection.h"
 #include "evaluate/matching/template_match.h"
 #include "evaluate/volume_pair.h"
+#include "io/images/mrc_format.h"
 #include "io/tables/star_file.h"
 #include "tomofield/error.h"
 
@@ -142,6 +143,10 @@ std::vector<ParticleReference> read_particles(const std::filesystem::path& list)
 }
 
 PickScore pick_score(const base::Volume& volume, const ParticleReference& particle) {
+  if (!io::is_known_size(volume.voxel_size_A))
+    throw Error(
+        "the volume has no voxel size, by which particles are looked for: set that of its "
+        "header");
   if (voxel_sizes_differ(volume.voxel_size_A, particle.density.voxel_size_A, 0.01))
     throw Error(fmt::format(
         "the volume has voxels of {:g} Å and the density of the particle '{}' of {:g} Å: give a "

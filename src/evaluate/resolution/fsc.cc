@@ -221,6 +221,11 @@ base::Volume read_mask(const std::filesystem::path& path, const std::filesystem:
   const auto quoted = [](const std::filesystem::path& file) {
     return fmt::format("'{}'", file.string());
   };
+  const auto of_mask = place_A(mask), of_volume = place_A(volume);
+  if (of_mask && of_volume && *of_mask != *of_volume)
+    throw Error(
+        fmt::format("the mask '{}' lies elsewhere than '{}' (ORIGIN): give one of its place",
+                    path.string(), second.string()));
   base::Volume weights = read_box(mask, box);
   require_one_voxel_size("the mask " + quoted(path), weights.voxel_size_A, quoted(second),
                          io::cubic_voxel_size_A(volume.header(), second));
@@ -359,7 +364,7 @@ std::optional<double> correlation_at(std::span<const double> frequency_per_A, co
 Fsc correlate_files(const FscFiles& files) {
   check_memory(files);
   VolumePair pair = read_pair(files.first, files.second, files.box);
-  if (!(pair.second.voxel_size_A > 0.0)) {
+  if (!io::is_known_size(pair.second.voxel_size_A)) {
     base::log_warning(fmt::format("'{}' has no voxel size: resolutions are in voxels, not in Å",
                                   files.second.string()));
     pair.second.voxel_size_A = 1.0;

@@ -96,7 +96,7 @@ std::optional<double> series_pixel_A(const fs::path& path, const io::StarTable& 
                                      const std::optional<std::string>& group) {
   for (std::size_t row = 0; row < optics.num_rows(); ++row) {
     if (group && optics.num_rows() > 1 && optics.find(row, kOpticsGroup) != group) continue;
-    const auto size_A = io::StarRow(path, optics, row).find_number(kSeriesPixel);
+    const auto size_A = io::StarRow(path, optics, row).find_stated_number(kSeriesPixel);
     if (!size_A || base::is_plausible_pixel_size(*size_A)) return size_A;
     throw Error(fmt::format("'{}': _{} is {} Å, and pixels have {} to {} Å", path.string(),
                             kSeriesPixel, *size_A, base::kPixelSizes_A.low(),
@@ -113,7 +113,9 @@ bool are_other_pixels(double stated_A, double of_model_A) {
 /// Returns the rotation that three angles of a row state. As in RELION, one that is not stated is
 /// 0.
 field::Rotation rotation_of(const io::StarRow& row, const std::array<const char*, 3>& columns) {
-  const auto angle = [&](const char* column) { return row.find_number(column).value_or(0.0); };
+  const auto angle = [&](const char* column) {
+    return row.find_stated_number(column).value_or(0.0);
+  };
   return field::rotation_from_euler(angle(columns[0]), angle(columns[1]), angle(columns[2]));
 }
 

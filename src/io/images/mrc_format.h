@@ -99,6 +99,9 @@ bool is_known_size(double size_A);
 /// for a stack of volumes.
 double cubic_voxel_size_A(const MrcHeader& header, const std::filesystem::path& path);
 
+/// A label of volumes that were turned before they were sampled. Their ORIGIN is 0, and no place.
+inline constexpr const char* kLabelOfTurnedBox = "turned: ORIGIN is not its place";
+
 /// Says of a file, as the rest of a sentence, that its header states values that its mode cannot
 /// hold: programs have written unsigned numbers as signed ones, and the other way round. Returns
 /// nothing if it does not.

@@ -18,6 +18,7 @@
 #include "base/check.h"
 #include "io/saving/positioned_file.h"
 #include "io/tables/alignment_files.h"
+#include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -301,6 +302,34 @@ class PageReader {
   std::span<float> out_;
 };
 
+// ImageJ's calibration: a number n of the file stands for offset + scale n.
+struct Calibration {
+  double offset = 0.0, scale = 1.0;
+};
+
+// Returns the calibration that a description of ImageJ states: "cf=0", a straight line, with "c0="
+// and "c1=". Throws Error for another curve. ImageJ writes numbers with a sign in this way.
+Calibration calibration_of(const std::filesystem::path& path,
+                           const std::vector<std::string>& description) {
+  Calibration found;
+  if (description.empty() || !description.front().starts_with("ImageJ=")) return found;
+  for (const std::string& line : description) {
+    const std::size_t equals = line.find('=');
+    if (equals == std::string::npos) continue;
+    const std::string_view key = trim(std::string_view(line).substr(0, equals));
+    const auto number = parse_number(trim(std::string_view(line).substr(equals + 1)));
+    if (key != "cf" && key != "c0" && key != "c1") continue;
+    if (!number || (key == "cf" && *number != 0.0))
+      throw Error(fmt::format(
+          "'{}' has a calibration of ImageJ that is no straight line ({}), which is not applied: "
+          "save it as 32-bit numbers",
+          path.string(), quote(line)));
+    if (key == "c0") found.offset = *number;
+    if (key == "c1") found.scale = *number;
+  }
+  return found;
+}
+
 class TiffStack : public ImageStack {
  public:
   explicit TiffStack(std::filesystem::path path) : path_(std::move(path)) {
@@ -308,6 +337,7 @@ class TiffStack : public ImageStack {
     format_ = file.format(0);
     header_.voxel_size_A = {format_.pixel_width_A, format_.pixel_height_A, format_.pixel_width_A};
     header_.labels = file.description();
+    calibration_ = calibration_of(path_, header_.labels);
     for (;;) {
       const PageFormat of_page = file.format(pages_.size());
       if (of_page != format_) refuse(file, of_page);
@@ -335,6 +365,10 @@ class TiffStack : public ImageStack {
         file.format(static_cast<std::size_t>(section)) != format_)
       file.fail("has changed while it was read");
     PageReader(file, format_, out).read();
+    const auto offset = static_cast<float>(calibration_.offset),
+               scale = static_cast<float>(calibration_.scale);
+    if (offset != 0.0f || scale != 1.0f)
+      std::ranges::transform(out, out.begin(), [&](float value) { return offset + scale * value; });
   }
 
  private:
@@ -364,6 +398,7 @@ class TiffStack : public ImageStack {
 
   std::filesystem::path path_;
   PageFormat format_;
+  Calibration calibration_;
   std::vector<std::uint64_t> pages_;  // places of their directories in the file
   MrcHeader header_;
 };

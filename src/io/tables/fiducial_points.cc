@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -36,6 +37,9 @@ FiducialPoint parse_point(const PointFile& file, const TextLine& line,
     numbers.push_back(*number);
   }
   const std::size_t first = numbers.size() - 3;
+  for (std::size_t i = 0; i < first; ++i)
+    if (numbers[i] < 0 || numbers[i] != std::floor(numbers[i]))
+      refuse(file, line, fmt::format("has '{}', which numbers no object or contour", words[i]));
   return {numbers[first], numbers[first + 1], numbers[first + 2], line.number};
 }
 

@@ -22,7 +22,7 @@ struct RelionTomogram {
   StatedOptics optics;
   std::string mtf;  ///< the file of the detector's transfer function, or empty
   std::optional<std::array<std::int64_t, 3>> size_px;  ///< unbinned
-  std::vector<std::string> not_applied;  ///< distortions that its row states, for messages
+  std::vector<std::string> not_applied{};  ///< distortions that its row states, for messages
 };
 
 /// A tomograms.star, or a STAR file of tilt series that has the same table without volumes.

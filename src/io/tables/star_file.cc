@@ -1,6 +1,7 @@
 #include "io/tables/star_file.h"
 
 #include <fmt/format.h>
+#include <strings.h>
 
 #include <algorithm>
 #include <array>
@@ -34,7 +35,7 @@ bool is_reserved(std::string_view value) {
 }
 
 bool fits_a_field(const std::string& value) {
-  return ("\n" + value).find("\n;") == std::string::npos && value.find('\r') == std::string::npos;
+  return value.find("\n;") == std::string::npos && value.find('\r') == std::string::npos;
 }
 
 // Returns a value in quotes if it needs them, or nothing if no quotes can hold it.
@@ -64,10 +65,11 @@ void require_texts(const std::filesystem::path& path, const std::vector<std::str
                    const std::vector<std::string>& row) {
   for (std::size_t i = 0; i < row.size(); ++i)
     if (!quoted_where_needed(row[i]))
-      throw Error(
-          fmt::format("'{}': the value '{}' of _{} has a carriage return, which no STAR file "
-                      "can hold: write it without",
-                      path.string(), quote(row[i]), columns[i]));
+      throw Error(fmt::format(
+          "'{}': the value '{}' of _{} has both quotes or several lines, and a carriage "
+          "return or a line that begins with a semicolon, so that it cannot be written "
+          "again: write it without these",
+          path.string(), quote(row[i]), columns[i]));
 }
 
 }  // namespace
@@ -76,7 +78,11 @@ StarTable::StarTable(std::string name, std::vector<std::string> columns)
     : name_(std::move(name)), columns_(std::move(columns)) {}
 
 std::optional<std::size_t> StarTable::index_of(std::string_view column) const {
-  const auto found = std::find(columns_.begin(), columns_.end(), column);
+  // Names are the same in upper and lower case (Hall 1991), which gemmi compares, too.
+  const auto found = std::ranges::find_if(columns_, [&](const std::string& name) {
+    return name.size() == column.size() &&
+           strncasecmp(name.c_str(), column.data(), name.size()) == 0;
+  });
   if (found == columns_.end()) return std::nullopt;
   return static_cast<std::size_t>(found - columns_.begin());
 }

@@ -172,6 +172,15 @@ class WarpXml {
     return parse(name, found->attribute("Value").value(), 1e6);
   }
 
+  // Tells whether a parameter of the element CTF is a list of numbers that are not all 0.
+  bool is_ctf_list_set(std::string_view name) const {
+    for (const pugi::xml_node param : child("CTF").children("Param"))
+      if (param.attribute("Name").value() == name)
+        return std::string_view(param.attribute("Value").value()).find_first_of("123456789") !=
+               std::string_view::npos;
+    return false;
+  }
+
   // Returns true if all nodes of a grid have one value, or if there is no such grid.
   bool is_all(const char* grid, double value) const {
     return std::ranges::all_of(child(grid).children("Node"), [&](const pugi::xml_node& node) {
@@ -410,6 +419,9 @@ ViewTable read_warp_xml(const std::filesystem::path& path) {
   table.defocus_hand = xml.defocus_hand();
   check_pixels(xml, table);
   note_other_grids(xml, table);
+  for (const char* name : {"BeamTilt", "BeamTilt2", "ZernikeCoeffsOdd", "ZernikeCoeffsEven"})
+    if (has_defocus(table) && xml.is_ctf_list_set(name))
+      table.ctf_not_applied.emplace_back(fmt::format("aberrations beside the defocus ({})", name));
   if (xml.is_stretched())
     table.not_applied.emplace_back("a MagnificationCorrection, which stretches the images");
   return table;

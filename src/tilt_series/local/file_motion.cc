@@ -44,7 +44,10 @@ FileMotion::FileMotion(const TiltSeriesOptions& options, const io::ImageStack& s
   if (options.local) {
     source_ = options.local->string();
     imod_ = io::read_imod_local(*options.local, stack.header().nz);
-    const double ratio = imod_->pixel_size_A > 0 ? imod_->pixel_size_A / pixel_size_A : 1.0;
+    // The header's size tells the binning, also where another size is right.
+    const double header_A = stack.header().voxel_size_A[0];
+    const double ratio =
+        imod_->pixel_size_A > 0 && header_A > 0 ? imod_->pixel_size_A / header_A : 1.0;
     if (std::abs(ratio - 1.0) > kSamePixel) scale_ = ratio;
   } else if (has_patches) {
     source_ = table->source;
