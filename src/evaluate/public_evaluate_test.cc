@@ -4,8 +4,10 @@
 #include <numbers>
 
 #include "base/random.h"
+#include "expect_parts.h"
 #include "tomofield/error.h"
 #include "tomofield/evaluate.h"
+#include "warning_catcher.h"
 
 namespace tomofield {
 namespace {
@@ -77,9 +79,18 @@ TEST(PublicEvaluate, RefusesVolumesThatCannotBeCompared) {
   other.voxel_size_A = 8.0;
   EXPECT_THROW(score_volume(volume, other), Error);
   EXPECT_THROW(correlate_shells(volume, other), Error);
-  other.voxel_size_A = 0.0;
-  EXPECT_NO_THROW(score_volume(volume, other));
-  EXPECT_THROW(correlate_shells(volume, other), Error);
+  // A size that is not known is that of the other volume.
+  for (const double unknown_A : {0.0, 1.0}) {
+    other.voxel_size_A = unknown_A;
+    const testing::WarningCatcher caught;
+    EXPECT_EQ(correlate_shells(volume, other).frequency_per_A,
+              correlate_shells(volume, volume).frequency_per_A);
+    EXPECT_NO_THROW(score_volume(volume, other));
+    testing::expect_parts(caught.text(), {"voxel sizes differ"});
+  }
+  Tomogram bare = volume;
+  bare.voxel_size_A = other.voxel_size_A = 0.0;
+  EXPECT_THROW(correlate_shells(bare, other), Error);
 }
 
 }  // namespace

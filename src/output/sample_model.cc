@@ -33,10 +33,24 @@ field::OrientedBox small_part(const Model& model, const field::OrientedBox& box)
   return part;
 }
 
+// Returns about how much of a box lies in the model: nothing is sampled beside it.
+double part_in_model(const Model& model, const field::OrientedBox& box) {
+  const BoxBounds bounds(box), model_bounds = field_bounds(model);
+  double part = 1.0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double low = std::max(bounds.low[a], model_bounds.low[a]);
+    const double high = std::min(bounds.high[a], model_bounds.high[a]);
+    const double length = bounds.high[a] - bounds.low[a];
+    if (length > 0.0) part *= std::clamp((high - low) / length, 0.0, 1.0);
+  }
+  return part;
+}
+
 }  // namespace
 
 void announce_sampling(const Model& model, const field::OrientedBox& box, std::size_t count) {
   constexpr double kFewPoints = 1 << 27, kShort_s = 10, kLong_s = 600;
+  constexpr double kSeconds_a_voxel = 8e-9;  // to write it, also beside the model
   constexpr std::size_t kFewBoxes = 10000;
   const double points = field::num_points(box) * static_cast<double>(count);
   if (points < kFewPoints && count < kFewBoxes) return;
@@ -44,7 +58,11 @@ void announce_sampling(const Model& model, const field::OrientedBox& box, std::s
   const auto begin = std::chrono::steady_clock::now();
   sample_box(model, part);
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
-  const double seconds = taken.count() * points / field::num_points(part);
+  const double in_model = part_in_model(model, box) / part_in_model(model, part);
+  double voxels = kSeconds_a_voxel * static_cast<double>(count);
+  for (const std::int64_t side : box.size) voxels *= static_cast<double>(side);
+  const double seconds =
+      taken.count() * points / field::num_points(part) * std::min(1.0, in_model) + voxels;
   if (seconds < kShort_s) return;
   const std::string text =
       fmt::format("sampling {}{} × {} × {} voxels may take about {}",

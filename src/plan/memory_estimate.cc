@@ -40,6 +40,13 @@ std::size_t band_memory(const measurement::Measurement& plan, const fit::Domain&
   return kSlabsOfBand * (2 * slab + views) + 3 * slab / kernels::kLanes;
 }
 
+// Returns how many bands of some rows are worked on at a time.
+int num_bands_in_use(const fit::Domain& domain, std::int64_t num_rows) {
+  const std::int64_t band_rows = domain.tree.roots().cell_size;
+  return static_cast<int>(
+      std::min<std::int64_t>(base::thread_count(), (num_rows + band_rows - 1) / band_rows));
+}
+
 // Returns the part of all parameters that this process keeps: its own and those of its neighbours
 // in `rows` rows beyond its bands.
 double part_of_parameters(const fit::Domain& domain, FieldKind kind,
@@ -165,6 +172,14 @@ std::size_t leaves_of_threads(const fit::Domain& domain) {
   return std::accumulate(largest.begin(), largest.end(), std::size_t{0});
 }
 
+std::size_t bands_memory(const measurement::Measurement& plan, const fit::Domain& domain,
+                         const FitOptions& options, std::int64_t num_rows) {
+  const int steps = steps_an_epoch(plan, options);
+  const int views_a_step = plan.ray_geometry ? 0 : (plan.geometry.num_views() + steps - 1) / steps;
+  return static_cast<std::size_t>(num_bands_in_use(domain, num_rows)) *
+         band_memory(plan, domain, views_a_step);
+}
+
 int num_fitted_views(const measurement::Measurement& plan, const FitOptions& options) {
   const auto held_out = measurement::held_out_views(plan.geometry.tilt_deg, options.hold_out);
   return plan.geometry.num_views() - static_cast<int>(held_out.size());
@@ -225,10 +240,7 @@ std::size_t estimate_memory(const PlannedFit& planned, const std::vector<fit::St
   const auto factorising =
       static_cast<std::size_t>(factorising_bytes(domain, stages, options.field, processes));
   const SlabViews::Shape own_shape = own_part(plan.rays_shape(), domain, processes);
-  const std::int64_t num_bands =
-      (own_shape.num_rows + domain.tree.roots().cell_size - 1) / domain.tree.roots().cell_size;
-  const int bands_in_use =
-      static_cast<int>(std::min<std::int64_t>(base::thread_count(), num_bands));
+  const int bands_in_use = num_bands_in_use(domain, own_shape.num_rows);
   const int slabs_in_use = kSlabsOfBand * bands_in_use;
   // The rays of all frames stay beside those of a half.
   const std::size_t ray_sets = options.files.even ? 2 : 1;
@@ -240,14 +252,13 @@ std::size_t estimate_memory(const PlannedFit& planned, const std::vector<fit::St
         SlabViews::resident_memory(SlabViews::binned_shape(own_shape, s.bin), slabs_in_use);
   }
   const int steps = steps_an_epoch(plan, options.fit);
-  const int views_a_step = plan.ray_geometry ? 0 : (plan.geometry.num_views() + steps - 1) / steps;
   const std::size_t surrogates =
       options.filters_views()
           ? fit::surrogate_memory(own_shape, plan.rays_shape(), steps, slabs_in_use)
           : 0;
   const std::size_t fitting =
       parameters + surrogates + static_cast<std::size_t>(prior_memory(planned)) +
-      std::max(static_cast<std::size_t>(bands_in_use) * band_memory(plan, domain, views_a_step),
+      std::max(bands_memory(plan, domain, options.fit, own_shape.num_rows),
                leaves_of_threads(domain)) +  // whose spikes are limited
       static_cast<std::size_t>(base::thread_count()) * thread_memory(plan, domain);
   const std::size_t tracing =

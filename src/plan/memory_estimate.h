@@ -33,6 +33,11 @@ std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domai
 /// Returns the bytes of the vertices of one leaf a thread, of the largest leaves.
 std::size_t leaves_of_threads(const fit::Domain& domain);
 
+/// Returns the bytes of the bands of a fit of `num_rows` rows that are worked on at a time: their
+/// slabs, and the views of a step.
+std::size_t bands_memory(const measurement::Measurement& plan, const fit::Domain& domain,
+                         const FitOptions& options, std::int64_t num_rows);
+
 int num_fitted_views(const measurement::Measurement& plan, const FitOptions& options);
 int steps_an_epoch(const measurement::Measurement& plan, const FitOptions& options);
 

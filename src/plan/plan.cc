@@ -81,8 +81,9 @@ std::size_t memory_of_trials(const measurement::Measurement& plan,
   const int at_once = (side_by_side + processes.size() - 1) / processes.size();
   measurement::SlabViews::Shape rays = plan.rays_shape();
   rays.num_rows = std::min(rays.num_rows, rows.height());
-  const std::size_t beside_it =
-      measurement::SlabViews::resident_memory(rays, 2) + thread_memory(plan, domain);
+  const std::size_t beside_it = measurement::SlabViews::resident_memory(rays, 2) +
+                                thread_memory(plan, domain) +
+                                bands_memory(plan, domain, trial.fit, rows.height());
   return kProgramBytes + measurement::SlabViews::resident_memory(plan.rays_shape(), 0) +
          leaves_of_threads(domain) +
          static_cast<std::size_t>(at_once) * (static_cast<std::size_t>(of_trial) + beside_it);
