@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <filesystem>
+
 #include "batch/state_record.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -104,6 +107,18 @@ TEST(Jobs, AreNotFinishedByFilesThatCannotBeRead) {
   const ScratchDirectory directory;
   for (const char* name : {"a.mrc", "a.json"}) directory.write(name, "");
   EXPECT_NE(fault_of_results(directory / "a.mrc").find("a.mrc"), std::string::npos);
+}
+
+TEST(Jobs, HaveProgressInTilesAndInAnAlignment) {
+  const testing::ScratchDirectory scratch;
+  EXPECT_FALSE(last_progress(scratch / "a.mrc"));
+  for (const char* name : {"a_align.json", "a_tiles.h5"}) {
+    const auto before = last_progress(scratch / "a.mrc");
+    std::filesystem::last_write_time(
+        scratch.write(name, ""),
+        before.value_or(std::filesystem::file_time_type::clock::now()) + std::chrono::seconds(5));
+    EXPECT_NE(last_progress(scratch / "a.mrc"), before) << name;
+  }
 }
 
 TEST(Needs, ComeFromThePlanOfARun) {

@@ -174,5 +174,16 @@ TEST_F(SeriesList, OptionsOfASeriesReplaceThoseOfAll) {
   EXPECT_EQ(command_of(series, common), wanted);
 }
 
+TEST_F(SeriesList, ACellOfAFlagThatIsFalseReplacesThatOfTheCommandLine) {
+  const Series without{.name = "n",
+                       .source = {},
+                       .input = "a.mrc",
+                       .output = "n.mrc",
+                       .options = {},
+                       .left_out = {"--invert"}};
+  EXPECT_EQ(command_of(without, {{"--invert", std::nullopt}, {"--bin", "2"}}),
+            (std::vector<std::string>{"reconstruct", "a.mrc", "--bin=2", "--output=n.mrc"}));
+}
+
 }  // namespace
 }  // namespace tomofield::batch

@@ -74,6 +74,10 @@ TEST(SlurmScript, HasNoLineThatANameMade) {
   EXPECT_THROW(
       slurm_script({.program = "p", .folder = "/data", .more = {"--mem=1G\nrm x"}}, {job(1, 1)}),
       Error);
+  for (const char* own : {"--signal=B:USR1@600", "--output=x", "--array=1-2%1", "-n 2", "--wrap=x"})
+    EXPECT_THROW(slurm_script({.program = "p", .folder = "/data", .more = {own}}, {job(1, 1)}),
+                 Error)
+        << own;
 }
 
 // Sets variables of the environment for one test.

@@ -829,6 +829,21 @@ def test_a_batch_that_is_stopped_goes_on(data, number):
     assert "resum" in harness.read_bytes(log).decode()
 
 
+def test_a_series_that_cannot_start_fails_alone(data):
+    """The folder of its results is one that nobody can write to."""
+    folder = harness.fresh_directory("no_start")
+    results = os.path.join(folder, "results")
+    program = pathlib.Path(folder, "tomofield")
+    program.write_text('#!/bin/sh\ncase "$*" in *--plan=*|*--plan*) ;; *a.mrc*) rm "$0";; esac\n'
+                       f'exec {harness.PROGRAM} "$@"\n', encoding="utf-8")
+    program.chmod(0o755)
+    said = harness.tomofield("batch", *pattern(data), *QUICK, "--choose", "each", "--at-once", 1, "-o", results,
+                             env={**os.environ, "TOMOFIELD_LAUNCHER": str(program)})
+    states = {name: row["state"] for name, row in summary(results).items()}
+    assert said.returncode == 1 and list(states.values()).count("failed") == 2, (said, states)
+    assert "cannot be run" in "".join(row["reason"] for row in summary(results).values())
+
+
 def sbatch_that_runs(folder, commands):
     """Returns the environment with an sbatch that runs these commands of the shell."""
     environment = fake_sbatch(folder, "")

@@ -1,9 +1,11 @@
 """Tests compare: the runs that it makes, how it goes on, and the report that it writes."""
 
 import csv
+import html
 import json
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -416,6 +418,29 @@ def refused(folder, facts, *command):
     for fact in facts:
         assert fact in result.stderr, (fact, result.stderr)
     assert harness.contents(folder) == before
+
+
+def test_the_commands_of_the_report_are_words_of_a_shell(series):
+    folder = harness.fresh_directory("commands")
+    stack = os.path.join(folder, "a$(touch PWN) b.mrc")
+    shutil.copy(series.input[0], stack)
+    harness.succeed("compare", stack, *series.input[1:], "--methods", "wbp", *QUICK, "-o", os.path.join(folder, "c"))
+    with open(os.path.join(folder, "c/report.html"), encoding="utf-8") as file:
+        listing = re.search(r"<h2>Commands</h2>.*?<pre[^>]*>(.*?)</pre>", file.read(), re.DOTALL)[1]
+    (line,) = html.unescape(re.sub("<[^>]*>", "", listing)).strip().splitlines()
+    assert stack in shlex.split(line), line
+
+
+def test_a_method_that_is_killed_is_said_to_be_killed(series):
+    folder = harness.fresh_directory("killed_method")
+    run = harness.start("compare", *series.input, "--methods", "wbp", "--also", OURS.format(4000), *QUICK, "-o", folder)
+    log = os.path.join(folder, "ours.log")
+    while not os.path.exists(log) or b"epoch" not in harness.read_bytes(log):
+        time.sleep(0.05)
+        assert run.poll() is None, run.communicate()
+    subprocess.run(["pkill", "-KILL", "-P", str(run.pid)], check=True)
+    said = run.communicate(timeout=60)[1]
+    assert run.returncode != 0 and "it was killed" in said, said
 
 
 def test_files_that_it_has_not_made_are_kept(series):

@@ -155,6 +155,22 @@ def test_voxels_that_are_no_cubes_are_refused():
         assert result.returncode == 2 and "10 × 10 × 40 Å" in result.stderr, result
 
 
+def test_a_turned_box_has_no_place():
+    """Its ORIGIN is 0, which is no place of it."""
+    _, series = simulate("turned", 24)
+    model = path("turned.mrc")
+    harness.succeed("reconstruct", series[1], *series[2:], "--thickness", 24, "--no-margin", "--epochs", 1,
+                    "--coarse-epochs", 2, "--tv", 5, "--prior", "tv", "-o", model)
+    box = path("turned_box.mrc")
+    harness.succeed("export", model[:-4] + ".h5", "-o", box, "--center", "30,30,12", "--size", "20,20,20",
+                    "--rotate", "0,0,1")
+    other = path("upright_box.mrc")
+    harness.succeed("export", model[:-4] + ".h5", "-o", other, "--center", "30,30,12", "--size", "20,20,20")
+    said = run(box, other)
+    assert said.returncode == 0 and "turned before it was sampled" in said.stderr, said
+    assert "placed by their ORIGINs" not in said.stderr
+
+
 def test_values_that_their_mode_cannot_hold_are_warned_of():
     """The header states the values that another program meant to write."""
     for mode, largest in (("int8", 255), ("int16", 51000)):
@@ -211,6 +227,18 @@ def test_origins_say_where_a_part_lies():
                    for name, origin in (("left.mrc", (0, 0, 0)), ("right.mrc", (510, 0, 0))))
     result = run(left, right)
     assert result.returncode == 2 and "51, 0, 0 voxels" in result.stderr, result
+    between = save("between.mrc", reconstruction, label="tomofield 1", origin=(85, 0, 0))
+    result = run(left, between)
+    assert result.returncode == 2 and "8.5 voxels" in result.stderr, result
+    mask = save("mask_elsewhere.mrc", np.ones_like(truth), label="tomofield 1", origin=(120, 0, 0))
+    result = run(left, "--fsc", whole, "--fsc-mask", mask)
+    assert result.returncode == 2 and "lies elsewhere" in result.stderr, result
+    with open(path("particles.star"), "w", encoding="utf-8") as file:
+        file.write("data_particles\nloop_\n_rlnCoordinateX\n_rlnCoordinateY\n_rlnCoordinateZ\n"
+                   "_tomofieldParticleKind\n1 2 3 ball\n")
+    save("particle_ball.mrc", np.ones((4, 4, 4)))
+    result = run(right, "--particles", path("particles.star"))
+    assert result.returncode == 2 and "a part of a volume" in result.stderr, result
     # A nonsensical ORIGIN is ignored.
     found, _ = evaluate(save("corner.mrc", corner, origin=(3, 4, 1e30)), whole)
     assert found["box_first"] == [0, 10, 0], found
@@ -545,6 +573,10 @@ def test_reprojection_error():
     wide = save("wide.mrc", volume, voxel_size=2 * float(mrcfile.open(truth, header_only=True).voxel_size.x))
     refused = run(wide, *series, "--no-margin")
     assert refused.returncode == 2 and "bring them to one voxel size" in refused.stderr, refused
+    elsewhere = save("elsewhere.mrc", volume, float(mrcfile.open(truth, header_only=True).voxel_size.x),
+                     label="tomofield 1", origin=(80, 0, 0))
+    refused = run(elsewhere, *series, "--no-margin")
+    assert refused.returncode == 2 and "--roi that it was made with" in refused.stderr, refused
     # Units and contrast do not matter. The hand does, and so does a volume that lacks something.
     other, _ = evaluate(save("units.mrc", -30 * volume), *series, "--no-margin")
     np.testing.assert_allclose(other["reprojection"]["error"], found["error"], rtol=1e-3)

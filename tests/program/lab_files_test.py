@@ -736,6 +736,29 @@ def test_the_description_of_a_tiff_stack_states_its_axis(tmp_path):
         assert part in said.stderr, said.stderr
 
 
+def test_imagej_writes_numbers_with_a_sign_by_a_calibration(tmp_path):
+    views = np.random.default_rng(1).normal(1000, 50, (11, 48, 48)).astype(np.int16)
+    np.savetxt(tmp_path / "s.tlt", np.linspace(-60, 60, 11))
+    def volume(stored, lines):
+        with tifffile.TiffWriter(tmp_path / "s.tif") as file:
+            for i, view in enumerate(stored):
+                file.write(view, photometric="minisblack", metadata=None,
+                           description=None if i else "ImageJ=1.53t\nimages=11\nslices=11\n" + lines)
+        harness.succeed("baseline", "wbp", tmp_path / "s.tif", "--tlt", tmp_path / "s.tlt", "--thickness", 8,
+                        "--contrast", "bright", "-o", tmp_path / "o.mrc", "--overwrite")
+        return mrcfile.read(tmp_path / "o.mrc")
+    plain = volume(views.astype(np.uint16), "")
+    signed = volume((views.astype(np.int32) + 32768).astype(np.uint16), "cf=0\nc0=-32768.0\nc1=1.0\n")
+    np.testing.assert_array_equal(plain, signed)
+    assert not np.array_equal(plain, volume(views.astype(np.uint16), "cf=0\nc0=0\nc1=-1.0\n"))
+    curve = harness.tomofield("info", tmp_path / "s.tif")
+    assert curve.returncode == 0
+    with tifffile.TiffWriter(tmp_path / "s.tif") as file:
+        file.write(views[0], photometric="minisblack", metadata=None, description="ImageJ=1.53t\ncf=2\nc0=1\nc1=2\n")
+    curve = harness.tomofield("info", tmp_path / "s.tif")
+    assert curve.returncode == 2 and "no straight line" in curve.stderr, curve
+
+
 def test_a_defocus_for_other_pixels_is_warned_of(tmp_path):
     views = np.random.default_rng(1).normal(1000, 50, (11, 48, 48)).astype(np.float32)
     harness.write_stack(tmp_path / "s.mrc", views, 5.0)

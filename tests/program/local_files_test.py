@@ -3,6 +3,7 @@ program's formula, written down here from its source, and must be reconstructed 
 
 import os
 import pathlib
+import re
 
 import numpy as np
 import pytest
@@ -128,6 +129,16 @@ def test_local_alignments_of_imod_are_applied():
     found, _ = distances(folder, "TS_01.st", "--tlt", "TS_01.tlt", "--thickness", THICKNESS,
                          "--local", "binned.xf")
     assert found.max() < 0.5, found
+
+
+def test_a_corrected_pixel_size_leaves_local_alignments_as_they_are():
+    folder = fresh_directory("calibrated")
+    write_views(folder, imod_place)
+    write_etomo(folder, "LOCALFILE TS_01local.xf")
+    said = {size: harness.succeed("reconstruct", "tilt.com", "--pixel-size", size, *FIT, "-o", "out.mrc", "--overwrite",
+                                  cwd=folder).stderr for size in (10, 9.3, 5)}
+    lines = {re.search(r"local alignment of .*", text)[0] for text in said.values()}
+    assert len(lines) == 1, lines
 
 
 def test_local_alignments_of_another_series_are_refused():

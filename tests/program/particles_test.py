@@ -244,6 +244,21 @@ def test_pixels_of_another_series_are_warned_of(folder):
     assert f"pixels of {8 * PIXEL_A:g} Å" in said and f"{PIXEL_A:g} Å" in said, said
 
 
+def test_angles_and_contours_that_make_no_sense_are_refused(folder):
+    particles = write_particles(folder)
+    with open(particles, encoding="utf-8") as file:
+        text = file.read().replace("_rlnAngleRot #5", "_rlnTomoSubtomogramRot #5")
+    with open(particles, "w", encoding="utf-8") as file:
+        file.write(text.replace("10 20 30 1\n", "<NA> 20 30 1\n", 1))
+    said = cut_out(folder, "--particles", particles, "--box", 8, run=harness.tomofield)
+    assert said.returncode == 2 and "rlnTomoSubtomogramRot is empty" in said.stderr, said
+    points = os.path.join(folder, "scored.txt")
+    with open(points, "w", encoding="utf-8") as file:
+        file.write("12.5 20.5 12.5 8.7\n")  # a score behind x, y and z
+    said = cut_out(folder, "--particles", points, "--box", 4, run=harness.tomofield)
+    assert said.returncode == 2 and "'12.5', which numbers no" in said.stderr, said
+
+
 def test_a_stack_of_integers_keeps_its_values(folder):
     particles = write_particles(folder)
     cut_out(folder, "--particles", particles, "--box", 8)

@@ -320,6 +320,29 @@ def test_the_pixel_size_of_warp_counts_where_its_averages_have_none(series):
     assert "--pixel-size 5 from" in printed, printed
 
 
+def test_the_microscope_of_a_project_counts_beside_a_given_defocus(series):
+    """RELION's row, and Warp's XML, also without a defocus of their own."""
+    folder = harness.fresh_directory("microscope")
+    star = star_projects.write_relion(folder, series)
+    _, xml = star_projects.write_warp(folder, series)
+    with open(xml, encoding="utf-16") as file:
+        text = file.read()
+    with open(xml, "w", encoding="utf-16") as file:
+        file.write(text.replace("</TiltSeries>", '<CTF><Param Name="Voltage" Value="200" /><Param Name="Cs" '
+                                'Value="1.4" /><Param Name="Amplitude" Value="0.1" /></CTF></TiltSeries>'))
+    wanted = {xml: ("--voltage 200", "--cs 1.4", "--amplitude-contrast 0.1")}
+    with open(star, encoding="utf-8") as file:
+        text = file.read()
+    if "_rlnVoltage" in text:
+        wanted[star] = ("--voltage", "--defocus-hand")
+    for project, options in wanted.items():
+        more = ["--series", "TS_01"] if project == star else []
+        for given in (["--defocus", 3], ["--dose-per-tilt", 3]):
+            said = harness.succeed("reconstruct", project, *more, *given, "--thickness", THICKNESS, "--dry-run", cwd=folder)
+            for option in options if "--defocus" in given else options[:1]:
+                assert f"{option} " in said.stdout + said.stderr, (option, said)
+
+
 def test_oblong_images_beside_a_pixel_size_of_relion_are_named(series):
     folder = harness.fresh_directory("oblong")
     star = star_projects.write_relion(folder, series)

@@ -83,9 +83,11 @@ TEST(StarFile, WritesWhatItReads) {
 TEST(StarFile, ReadsTheTextsThatItWrites) {
   const ScratchDirectory scratch;
   const std::vector<std::string> texts{
-      "data_x", "Data_",       "loop_",        "stop_", "save_1", "global_", "[x]", "two\nlines",
-      "$a",     "it's \"so\"", "a\n\"b\" 'c'", "_x",    "#1",     ";",       "ä",   "tab\tbed",
-      "?",      ".",           "loop_es"};
+      "data_x",       "Data_", "loop_",      "stop_",   "save_1",
+      "global_",      "[x]",   "two\nlines", "$a",      "it's \"so\"",
+      "a\n\"b\" 'c'", "_x",    "#1",         ";",       "ä",
+      "tab\tbed",     "?",     ".",          "loop_es", ";it's \"so\"",
+      ";a\n\"b\" 'c'"};
   StarTable table("global", {"rlnTomoName", "rlnTomoHand"});
   for (const std::string& text : texts) table.add_row({text, text});
   const auto tables = read_star_file(scratch.write("a.star", star_file_text(table)));
@@ -113,6 +115,14 @@ TEST(StarFile, RefusesATextThatNoQuotesHold) {
   StarTable table("global", {"a"});
   table.add_row({"x\n;y"});
   EXPECT_THROW(star_file_text(table), Error);
+}
+
+TEST(StarFile, NamesOfColumnsAreTheSameInUpperAndLowerCase) {
+  StarTable table("global", {"rlnTomoName", "rlntomosizex"});
+  table.add_row({"TS_01", "3"});
+  table.set(0, "rlnTomoSizeX", "4");
+  EXPECT_EQ(table.columns().size(), 2u);
+  EXPECT_EQ(table.find(0, "rlnTomoSizeX"), "4");
 }
 
 TEST(StarFile, RemovesAColumn) {
