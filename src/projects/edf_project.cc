@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <map>
 #include <optional>
@@ -41,12 +40,6 @@ Entries read_entries(const fs::path& edf) {
 std::string value_of(const Entries& entries, std::string_view name) {
   const auto found = entries.find(name);
   return found == entries.end() ? std::string() : found->second;
-}
-
-// Returns the value of an option that the project has set, or an empty text.
-std::string setting_of(const Project& project, std::string_view option) {
-  const auto found = std::ranges::find(project.settings(), option, &Setting::option);
-  return found == project.settings().end() ? std::string() : found->value;
 }
 
 // Returns the first of the files NAME + ending that is there.
@@ -101,8 +94,7 @@ void set_pixel_size(Project& project, const fs::path& edf, const Entries& entrie
   constexpr const char* kEntry = "Setup.PixelSize";
   constexpr double kAngstroms_in_nm = 10.0;
   const std::string text = value_of(entries, kEntry);
-  if (text.empty() || project.ignores(kEntry) || !setting_of(project, "--pixel-size").empty())
-    return;
+  if (text.empty() || project.ignores(kEntry) || !project.value_of("--pixel-size").empty()) return;
   const auto size_nm = io::parse_number(text);
   if (!size_nm)
     throw Error(fmt::format(
@@ -176,8 +168,8 @@ void read_edf_project(Project& project) {
     project.add_file(tilt);
     read_imod_project(project, tilt);
     // The size is that of the raw stack.
-    if (!setting_of(project, "--xf").empty())
-      set_pixel_size(project, edf, entries, setting_of(project, "stack"));
+    if (!project.value_of("--xf").empty())
+      set_pixel_size(project, edf, entries, project.value_of("stack"));
     return compare_axis(project, edf, entries);
   }
   const std::string name = value_of(entries, "Setup.DatasetName");

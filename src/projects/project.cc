@@ -106,6 +106,11 @@ bool Project::ignores(std::string_view entry) {
   return option_table::has_name(request_.ignored, entry);
 }
 
+std::string Project::value_of(std::string_view option) const {
+  const auto found = std::ranges::find(settings_, option, &Setting::option);
+  return found == settings_.end() ? std::string() : found->value;
+}
+
 void Project::set(std::string_view option, std::string value, const fs::path& file,
                   std::string_view entry, std::string row) {
   if (ignores(entry)) return;

@@ -43,6 +43,9 @@ class Project {
   void set(std::string_view option, std::string value, const std::filesystem::path& file,
            std::string_view entry, std::string row = {});
 
+  /// Returns the value of an option that is set, or an empty text.
+  std::string value_of(std::string_view option) const;
+
   /// Adds a warning about something that the result does not show by itself.
   void warn(std::string message) { warnings_.push_back(std::move(message)); }
 

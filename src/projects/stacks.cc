@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "io/images/image_stack.h"
@@ -60,14 +59,10 @@ void set_stated_pixel_size(Project& project, const StatedPixelSize& stated, doub
 
 void warn_of_other_rotation(Project& project, const fs::path& file, const std::string& entry,
                             double angle_deg) {
-  const auto value_of = [&](std::string_view option) {
-    const auto found = std::ranges::find(project.settings(), option, &Setting::option);
-    return found == project.settings().end() ? std::string() : found->value;
-  };
-  const std::string xf = value_of("--xf");
+  const std::string xf = project.value_of("--xf");
   if (xf.empty() || project.ignores(entry)) return;
   const double axis_deg =
-      tilt_series::axis_of_transforms(xf, *io::open_image_stack(value_of("stack")));
+      tilt_series::axis_of_transforms(xf, *io::open_image_stack(project.value_of("stack")));
   const tilt_series::StatedAxis stated{angle_deg, fmt::format("{} of '{}'", entry, file.string())};
   if (const auto found = tilt_series::contradiction_of_axis(stated, axis_deg, xf))
     project.warn(*found);

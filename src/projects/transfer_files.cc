@@ -227,8 +227,8 @@ bool is_one_of(const std::array<std::string_view, kCount>& names, std::string_vi
 
 // Returns the tilt about X that the project has set, or 0.
 double x_axis_tilt(const Project& project) {
-  const auto set = std::ranges::find(project.settings(), "--x-axis-tilt", &Setting::option);
-  return set == project.settings().end() ? 0.0 : double{io::parse_number(set->value).value()};
+  const auto set = io::parse_number(project.value_of("--x-axis-tilt"));
+  return set ? double{*set} : 0.0;
 }
 
 // Warns of what changes the contrast transfer and is not applied. The phase shifts that count are
