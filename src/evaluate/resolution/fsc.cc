@@ -221,8 +221,11 @@ base::Volume read_mask(const std::filesystem::path& path, const std::filesystem:
   const auto quoted = [](const std::filesystem::path& file) {
     return fmt::format("'{}'", file.string());
   };
+  constexpr double kSamePlace_A = 0.1;
   const auto of_mask = place_A(mask), of_volume = place_A(volume);
-  if (of_mask && of_volume && *of_mask != *of_volume)
+  if (of_mask && of_volume && !std::ranges::equal(*of_mask, *of_volume, [](double a, double b) {
+        return std::fabs(a - b) < kSamePlace_A;
+      }))
     throw Error(
         fmt::format("the mask '{}' lies elsewhere than '{}' (ORIGIN): give one of its place",
                     path.string(), second.string()));
