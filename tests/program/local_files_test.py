@@ -134,6 +134,7 @@ def test_local_alignments_of_imod_are_applied():
 def test_a_corrected_pixel_size_leaves_local_alignments_as_they_are():
     folder = fresh_directory("calibrated")
     write_views(folder, imod_place)
+    write_local(folder)
     write_etomo(folder, "LOCALFILE TS_01local.xf")
     said = {size: harness.succeed("reconstruct", "tilt.com", "--pixel-size", size, *FIT, "-o", "out.mrc", "--overwrite",
                                   cwd=folder).stderr for size in (10, 9.3, 5)}

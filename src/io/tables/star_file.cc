@@ -60,16 +60,16 @@ std::string star_text(const std::string& value) {
   throw Error(fmt::format("'{}' cannot be written into a STAR file", quote(value)));
 }
 
-// Refuses what could be read and not be written again: a carriage return within quotes.
+// Refuses what could be read and not be written again, such as a carriage return within quotes.
 void require_texts(const std::filesystem::path& path, const std::vector<std::string>& columns,
                    const std::vector<std::string>& row) {
   for (std::size_t i = 0; i < row.size(); ++i)
     if (!quoted_where_needed(row[i]))
       throw Error(fmt::format(
-          "'{}': the value '{}' of _{} has both quotes or several lines, and a carriage "
-          "return or a line that begins with a semicolon, so that it cannot be written "
-          "again: write it without these",
-          path.string(), quote(row[i]), columns[i]));
+          "'{}': the value '{}' of _{} has {}, which no STAR file can hold: write it without",
+          path.string(), quote(row[i]), columns[i],
+          row[i].find('\r') != std::string::npos ? "a carriage return"
+                                                 : "lines of which one begins with a semicolon"));
 }
 
 }  // namespace
