@@ -477,6 +477,21 @@ TEST(ViewTable, RefusesXmlThatStatesSomethingTwice) {
                {"TS.xml", "<TiltSeries>", "twice"});
 }
 
+TEST(ViewTable, NamesAberrationsOfWarpAndKeepsItsTilts) {
+  const ScratchDirectory scratch;
+  const auto with = [&](const std::string& value) {
+    return scratch.write("TS.xml", kSeriesXml + grid("GridCTF", "", "<Node Value=\"3\"/>") +
+                                       "<CTF><Param Name=\"BeamTilt\" Value=\"" + value +
+                                       "\"/></CTF></TiltSeries>");
+  };
+  EXPECT_TRUE(read_view_table(with("(0, 0)")).ctf_not_applied.empty());
+  const CtfTable ctf = read_ctf(with("(3, 2)"));
+  ASSERT_EQ(ctf.not_applied.size(), 1u);
+  expect_parts(ctf.not_applied[0], {"aberrations", "BeamTilt"});
+  ASSERT_EQ(ctf.tilt_deg.size(), 2u);  // as IMOD has them
+  EXPECT_EQ(ctf.tilt_deg[0], 61.0);
+}
+
 TEST(ViewTable, RefusesAnglesOfWarpsDefocusBeyondATurn) {
   const ScratchDirectory scratch;
   const auto refusal = [&](const std::string& name, const std::string& value) {
