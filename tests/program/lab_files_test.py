@@ -5,6 +5,7 @@ beads of these series lie at known places by the formulas of the other programs.
 import json
 import os
 import re
+import shutil
 
 import mrcfile
 import numpy as np
@@ -734,6 +735,36 @@ def test_the_description_of_a_tiff_stack_states_its_axis(tmp_path):
                            description=f"SerialEM: x\n    Tilt axis angle = {others if i else first}, binning = 1")
         said = harness.succeed("info", tmp_path / "s.tif", "--tlt", tmp_path / "s.tlt")
         assert part in said.stderr, said.stderr
+
+
+@pytest.mark.parametrize("with_commands", [False, True])
+def test_what_lies_beside_a_dataset_of_etomo_counts_with_tilt_com_and_without(with_commands):
+    folder = write_series("beside_edf", 0.0, stack="TS_01.st")
+    write(folder, "TS_01.xf", transforms(0.0))
+    shutil.copy(os.path.join(folder, "TS_01.rawtlt"), os.path.join(folder, "TS_01.tlt"))
+    write(folder, "TS_01.edf", "Setup.DatasetName=TS_01\nSetup.AxisType=Single Axis\nSetup.PixelSize=0.5\n")
+    write(folder, "TS_01.defocus", f"1 {len(TILTS)} 0 0 3000 2\n")
+    write(folder, "ctfcorrection.com", "$ctfphaseflip -StandardInput\nVoltage 200\n")
+    if with_commands:
+        write(folder, "tilt.com", "$tilt -StandardInput\nInputProjections TS_01_ali.mrc\nIMAGEBINNED 1\n"
+                                  "TILTFILE TS_01.tlt\nTHICKNESS 24\n")
+    said = dry(folder, "TS_01.edf")
+    expect(said, "--ctf TS_01.defocus", "--voltage 200 from", "states pixels of 5 Å")
+
+
+def test_halves_that_their_mode_cannot_hold_are_named():
+    folder = write_series("half_modes")
+    views = 100 + 10 * bead_views(0, (56, 72))
+    for name in ("TS_01.mrc", "even.mrc", "odd.mrc"):
+        with mrcfile.new(os.path.join(folder, name), views.astype("<i2"), overwrite=True) as file:
+            file.voxel_size = 10
+            if name == "odd.mrc":
+                file.header.dmin, file.header.dmax = 0, 60000
+    said = harness.tomofield("reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--even", "even.mrc", "--odd", "odd.mrc",
+                             "--thickness", 24, "--contrast", "bright", "--no-margin", "--epochs", 1, "--coarse-epochs", 2,
+                             "--tv", 5, "--prior", "tv", "--view-scale", "off", "-o", "o.mrc", cwd=folder)
+    expect(said.stderr, "odd.mrc' has 16-bit numbers with sign", "misread")
+    assert "even.mrc' has" not in said.stderr
 
 
 def test_imagej_writes_numbers_with_a_sign_by_a_calibration(tmp_path):
