@@ -4,7 +4,6 @@
 #include <span>
 #include <vector>
 
-#include "base/log.h"
 #include "base/plausible.h"
 #include "base/system/memory.h"
 #include "exchange/model_export.h"
@@ -83,8 +82,7 @@ Tomogram read_mrc(const std::filesystem::path& path) {
   Tomogram volume{.size = {header.nx, header.ny, header.nz},
                   .voxel_size_A = io::cubic_voxel_size_A(header, path),
                   .values = std::vector<float>(count)};
-  if (const auto contradiction = io::contradiction_of_mode(header))
-    base::log_warning(fmt::format("'{}' {}", path.string(), *contradiction));
+  io::warn_of_mode(header, path.string());
   for (std::int64_t z = 0; z < header.nz; ++z)
     file.read_section(
         z, std::span(volume.values).subspan(static_cast<std::size_t>(z) * section, section));

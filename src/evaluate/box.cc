@@ -6,7 +6,6 @@
 #include <cmath>
 #include <vector>
 
-#include "base/log.h"
 #include "io/images/mrc_format.h"
 #include "tomofield/error.h"
 
@@ -34,8 +33,7 @@ std::string to_text(const base::Box& box) {
 
 base::Volume read_box(const io::MrcReader& file, const base::Box& box) {
   base::Volume volume(box.shape(), io::cubic_voxel_size_A(file.header(), file.path()));
-  if (const auto contradiction = io::contradiction_of_mode(file.header()))
-    base::log_warning(fmt::format("'{}' {}", file.path().string(), *contradiction));
+  io::warn_of_mode(file.header(), file.path().string());
   const base::Shape3& shape = volume.shape;
   std::vector<float> rows(static_cast<std::size_t>(file.header().nx * shape.ny));
   for (std::int64_t z = 0; z < shape.nz; ++z) {

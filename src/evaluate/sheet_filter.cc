@@ -123,14 +123,13 @@ DetectionScore membrane_score(const base::Volume& volume, const base::Volume& la
                     num_bad));
   }
   const double sigma_px = kSheetSigma_A / label.voxel_size_A;
-  const base::Shape3& shape = label.shape;
-  if (sigma_px > static_cast<double>(std::max({shape.nx, shape.ny, shape.nz})))
-    throw Error(fmt::format(
-        "the filter for sheets blurs by {:g} Å, and all of the volume has {:.3g} Å by "
-        "its voxels of {:g} Å: correct its header",
-        kSheetSigma_A,
-        static_cast<double>(std::max({shape.nx, shape.ny, shape.nz})) * label.voxel_size_A,
-        label.voxel_size_A));
+  const auto longest_px =
+      static_cast<double>(std::max({label.shape.nx, label.shape.ny, label.shape.nz}));
+  if (sigma_px > longest_px)
+    throw Error(
+        fmt::format("the filter for sheets blurs by {:g} Å, and all of the volume has {:.3g} Å by "
+                    "its voxels of {:g} Å: correct its header",
+                    kSheetSigma_A, longest_px * label.voxel_size_A, label.voxel_size_A));
   const base::Volume response = sheet_response(volume, sigma_px);
   std::vector<Detection> voxels(response.data.size());
   std::size_t num_true = 0;

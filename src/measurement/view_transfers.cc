@@ -169,24 +169,20 @@ std::optional<double> voltage_of_mdoc(const SeriesFiles& files) {
 
 constexpr double kSameVoltage_kV = 1.0;
 
-// Says so if two files state different voltages, one of which is that of the microscope.
-void warn_of_voltages(double used_kV, const io::CtfTable& ctf) {
-  if (!ctf.optics.voltage_kV || std::abs(*ctf.optics.voltage_kV - used_kV) <= kSameVoltage_kV)
-    return;
-  base::log_warning(fmt::format(
-      "'{}' has the defocus for a voltage of {} kV, and {} kV count: give the right one with "
-      "--voltage",
-      ctf.file.string(), *ctf.optics.voltage_kV, used_kV));
-}
+// A number of the microscope for messages: its name, its unit, the option that sets it, and the
+// difference up to which two are the same.
+struct OpticsName {
+  std::string_view what, unit, option;
+  double same;
+};
 
 // Says so if a file states another number of the microscope than the one that counts.
-void warn_of_other_optics(const io::CtfTable& ctf, const std::optional<double>& stated, double used,
-                          std::string_view what, std::string_view option) {
-  constexpr double kRounding = 0.001;
-  if (!stated || std::fabs(*stated - used) <= kRounding * std::max(used, 1.0)) return;
+void warn_of_other_optics(const std::filesystem::path& file, const std::optional<double>& stated,
+                          double used, const OpticsName& name) {
+  if (!stated || std::fabs(*stated - used) <= name.same) return;
   base::log_warning(
-      fmt::format("'{}' has the defocus for {} of {}, and {} counts: give the right one with {}",
-                  ctf.file.string(), what, *stated, used, option));
+      fmt::format("'{}' has the defocus for {} of {}{}, and {}{} count: give the right one with {}",
+                  file.string(), name.what, *stated, name.unit, used, name.unit, name.option));
 }
 
 // Says so if the defocus was measured with another pixel size, which makes it wrong by the square.
@@ -228,15 +224,17 @@ microscope::Optics find_optics(const SeriesFiles& files, const ViewOptions& opti
   if (!options.voltage_kV && recorded_kV)
     base::log_info(fmt::format("voltage: {} kV from '{}'", *recorded_kV, recorded_in));
   if (!ctf) return microscope::without_phase_contrast(optics);
-  warn_of_voltages(optics.voltage_kV, *ctf);
+  warn_of_other_optics(ctf->file, stated.voltage_kV, optics.voltage_kV,
+                       {"a voltage", " kV", "--voltage", kSameVoltage_kV});
   warn_of_pixels(series.pixel_size_A() / series.bin_factor(), *ctf);
   choose(optics.spherical_aberration_mm, options.spherical_aberration_mm,
          stated.spherical_aberration_mm);
   choose(optics.amplitude_contrast, options.amplitude_contrast, stated.amplitude_contrast);
-  warn_of_other_optics(*ctf, stated.spherical_aberration_mm, optics.spherical_aberration_mm,
-                       "a spherical aberration in mm", "--cs");
-  warn_of_other_optics(*ctf, stated.amplitude_contrast, optics.amplitude_contrast,
-                       "an amplitude contrast", "--amplitude-contrast");
+  warn_of_other_optics(ctf->file, stated.spherical_aberration_mm, optics.spherical_aberration_mm,
+                       {"a spherical aberration", " mm", "--cs",
+                        0.001 * std::max(optics.spherical_aberration_mm, 1.0)});
+  warn_of_other_optics(ctf->file, stated.amplitude_contrast, optics.amplitude_contrast,
+                       {"an amplitude contrast", "", "--amplitude-contrast", 0.001});
   return optics;
 }
 

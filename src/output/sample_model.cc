@@ -59,10 +59,10 @@ void announce_sampling(const Model& model, const field::OrientedBox& box, std::s
   sample_box(model, part);
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
   const double in_model = part_in_model(model, box) / part_in_model(model, part);
-  double voxels = kSeconds_a_voxel * static_cast<double>(count);
-  for (const std::int64_t side : box.size) voxels *= static_cast<double>(side);
+  double writing_s = kSeconds_a_voxel * static_cast<double>(count);
+  for (const std::int64_t side : box.size) writing_s *= static_cast<double>(side);
   const double seconds =
-      taken.count() * points / field::num_points(part) * std::min(1.0, in_model) + voxels;
+      taken.count() * points / field::num_points(part) * std::min(1.0, in_model) + writing_s;
   if (seconds < kShort_s) return;
   const std::string text =
       fmt::format("sampling {}{} × {} × {} voxels may take about {}",

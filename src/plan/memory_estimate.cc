@@ -70,11 +70,11 @@ double part_that_rays_meet(const fit::Domain& domain, FieldKind kind) {
   for (int i = 0; i < domain.tree.num_leaves(); ++i) {
     const field::Square& square = domain.tree.leaf(i).square;
     const field::LeafShape& shape = domain.shapes[static_cast<std::size_t>(i)];
-    const bool meets_rays =
-        static_cast<double>(square.x0)<domain.support.x1&& static_cast<double>(square.x1())> domain
-            .support.x0 &&
-        static_cast<double>(square.y0)<domain.support.y1&& static_cast<double>(square.y1())> domain
-            .support.y0;
+    const auto overlap = [](std::int64_t low, std::int64_t high, double from, double to) {
+      return static_cast<double>(high) > from && to > static_cast<double>(low);
+    };
+    const bool meets_rays = overlap(square.x0, square.x1(), domain.support.x0, domain.support.x1) &&
+                            overlap(square.y0, square.y1(), domain.support.y0, domain.support.y1);
     if (meets_rays || field::count_parameters(kind, {shape}) * sizeof(float) < kSmallLeaf)
       met.push_back(shape);
   }
@@ -223,9 +223,8 @@ double fitted_bytes(const fit::Domain& domain, const std::vector<fit::Stage>& st
   double largest = 0;
   for (const fit::Stage& s : stages) {
     const bool may_change = options.tree == TreeKind::kAdaptive && &s == &stages.front();
-    const double written = kCopiesThatRaysWrite * part_that_rays_meet(domain, s.field_kind);
-    const double copies =
-        may_change ? kCopiesOfChange + written / kCopiesThatRaysWrite : 1 + written;
+    const double met = part_that_rays_meet(domain, s.field_kind);
+    const double copies = may_change ? kCopiesOfChange + met : 1 + kCopiesThatRaysWrite * met;
     largest = std::max(largest, copies * part_in_stage(domain, s) *
                                     parameter_bytes(domain, options, s.field_kind, processes));
   }

@@ -88,9 +88,13 @@ void set_axis(Project& project, const fs::path& edf, const Entries& entries) {
                   edf.string()));
 }
 
+double pixel_size_A(const fs::path& stack) {
+  return io::open_image_stack(stack)->header().voxel_size_A[0];
+}
+
 // Sets the pixel size, which eTomo writes in nm, if the stack has none.
 void set_pixel_size(Project& project, const fs::path& edf, const Entries& entries,
-                    const fs::path& stack) {
+                    double in_header_A) {
   constexpr const char* kEntry = "Setup.PixelSize";
   constexpr double kAngstroms_in_nm = 10.0;
   const std::string text = value_of(entries, kEntry);
@@ -101,8 +105,7 @@ void set_pixel_size(Project& project, const fs::path& edf, const Entries& entrie
         "'{}': {} is '{}', which is no size of a pixel: correct it, or go on with --ignore {}",
         edf.string(), kEntry, io::quote(text), kEntry));
   if (*size_nm > 0)
-    set_stated_pixel_size(project, {edf, kEntry, kAngstroms_in_nm * *size_nm},
-                          io::open_image_stack(stack)->header().voxel_size_A[0]);
+    set_stated_pixel_size(project, {edf, kEntry, kAngstroms_in_nm * *size_nm}, in_header_A);
 }
 
 // Warns of tilts that a dataset states itself, and of which eTomo has made no file.
@@ -150,10 +153,10 @@ void set_dataset(Project& project, const fs::path& edf, const Entries& entries,
           "'{}': {} names '{}', which is not applied (--ignore {} says that this is meant)",
           edf.string(), entry, io::quote(file), entry));
   const bool has_defocus = set_transfer_files(project, edf.parent_path(), name);
-  set_imod_optics(project, edf.parent_path() / "tilt.com",
-                  {.in_header_A = io::open_image_stack(*stack)->header().voxel_size_A[0]},
+  const double in_header_A = pixel_size_A(*stack);
+  set_imod_optics(project, edf.parent_path() / "tilt.com", {.in_header_A = in_header_A},
                   has_defocus || project.request().has_transfer);
-  set_pixel_size(project, edf, entries, *stack);
+  set_pixel_size(project, edf, entries, in_header_A);
   if (const fs::path xtilt = stem.string() + ".xtilt"; is_file(xtilt))
     project.set("--xtilt", xtilt.string(), edf, kEntry);
 }
@@ -169,7 +172,7 @@ void read_edf_project(Project& project) {
     read_imod_project(project, tilt);
     // The size is that of the raw stack.
     if (!project.value_of("--xf").empty())
-      set_pixel_size(project, edf, entries, project.value_of("stack"));
+      set_pixel_size(project, edf, entries, pixel_size_A(project.value_of("stack")));
     return compare_axis(project, edf, entries);
   }
   const std::string name = value_of(entries, "Setup.DatasetName");

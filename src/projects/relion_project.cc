@@ -74,20 +74,6 @@ bool set_views(Project& project, const fs::path& views, const fs::path& named_by
   return has_defocus;
 }
 
-// Sets what the row of a tomogram says of the microscope: the voltage, on which a dose depends,
-// too, and the rest beside a contrast transfer.
-void set_optics(Project& project, const io::RelionTomogram& tomogram, const fs::path& star,
-                bool has_transfer) {
-  const auto set = [&](std::string_view option, std::string_view column,
-                       const std::optional<double>& value) {
-    if (value) project.set(option, fmt::format("{}", *value), star, column);
-  };
-  set("--voltage", "rlnVoltage", tomogram.optics.voltage_kV);
-  if (!has_transfer) return;
-  set("--cs", "rlnSphericalAberration", tomogram.optics.spherical_aberration_mm);
-  set("--amplitude-contrast", "rlnAmplitudeContrast", tomogram.optics.amplitude_contrast);
-}
-
 // Notes the table of a tomogram, which results must not replace.
 void add_table_of(Project& project, const io::RelionTomogram& tomogram, const fs::path& star) {
   try {
@@ -134,7 +120,8 @@ void read_relion_project(Project& project) {
   for (const io::RelionTomogram& other : tomograms) add_table_of(project, other, star);
   const bool has_transfer = set_views(project, views, star, "rlnTomoTiltSeriesStarFile", tomogram);
   const bool may_transfer = has_transfer || project.request().has_transfer;
-  set_optics(project, tomogram, star, may_transfer);
+  set_stated_optics(project, tomogram.optics, star,
+                    {"rlnVoltage", "rlnSphericalAberration", "rlnAmplitudeContrast"}, may_transfer);
   if (may_transfer) set_detector(project, tomogram, star);
   for (const std::string& what : tomogram.not_applied)
     project.warn(fmt::format("'{}', tomogram {}: {}, which is not applied", star.string(),

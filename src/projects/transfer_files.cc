@@ -264,6 +264,18 @@ void warn_of_unused_transfer(Project& project, const io::ViewTable& table) {
                              table.file.string(), what));
 }
 
+void set_stated_optics(Project& project, const io::StatedOptics& optics, const fs::path& file,
+                       const OpticsEntries& entries, bool has_transfer) {
+  const auto set = [&](std::string_view option, std::string_view entry,
+                       const std::optional<double>& value) {
+    if (value) project.set(option, fmt::format("{}", *value), file, entry);
+  };
+  set("--voltage", entries.voltage, optics.voltage_kV);
+  if (!has_transfer) return;
+  set("--cs", entries.spherical_aberration, optics.spherical_aberration_mm);
+  set("--amplitude-contrast", entries.amplitude_contrast, optics.amplitude_contrast);
+}
+
 void set_imod_optics(Project& project, const fs::path& tilt_com, const StackPixels& pixels,
                      bool has_transfer) {
   const CtfCommands commands(tilt_com);

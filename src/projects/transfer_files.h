@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "io/tables/view_table.h"
 #include "projects/project.h"
@@ -22,6 +23,17 @@ bool set_imod_transfer(Project& project, const std::filesystem::path& tilt_com,
 
 /// Warns that the contrast transfer of a table is not applied, and why, if it has a part of it.
 void warn_of_unused_transfer(Project& project, const io::ViewTable& table);
+
+/// The names of the entries of a file that state the microscope.
+struct OpticsEntries {
+  std::string_view voltage, spherical_aberration, amplitude_contrast;
+};
+
+/// Sets what a file states of the microscope: --voltage, on which a dose depends, too, and, beside
+/// a contrast transfer, --cs and --amplitude-contrast.
+void set_stated_optics(Project& project, const io::StatedOptics& optics,
+                       const std::filesystem::path& file, const OpticsEntries& entries,
+                       bool has_transfer);
 
 /// The stack that is read: the pixel size in its header, and whether it is the raw one or the
 /// aligned one, whose pixels are larger by `bin`.

@@ -25,19 +25,6 @@ double set_pixel_size(Project& project, const io::ViewTable& table) {
   return is_known ? in_header_A : *stated_A;
 }
 
-// Sets what the XML file says of the microscope: the voltage, on which a dose depends, too, and the
-// rest beside a contrast transfer.
-void set_optics(Project& project, const io::ViewTable& table, bool has_transfer) {
-  const auto set = [&](std::string_view option, std::string_view entry, const auto& value) {
-    if (value) project.set(option, fmt::format("{}", *value), table.file, entry);
-  };
-  set("--voltage", "Voltage", table.optics.voltage_kV);
-  if (!has_transfer) return;
-  set("--cs", "Cs", table.optics.spherical_aberration_mm);
-  set("--amplitude-contrast", "Amplitude", table.optics.amplitude_contrast);
-  set("--defocus-hand", "AreAnglesInverted", table.defocus_hand);
-}
-
 }  // namespace
 
 void read_warp_project(Project& project) {
@@ -51,7 +38,11 @@ void read_warp_project(Project& project) {
     project.set("--ctf", path.string(), path, "GridCTF");
   else
     warn_of_unused_transfer(project, table);
-  set_optics(project, table, has_defocus || project.request().has_transfer);
+  const bool may_transfer = has_defocus || project.request().has_transfer;
+  set_stated_optics(project, table.optics, path, {"Voltage", "Cs", "Amplitude"}, may_transfer);
+  if (may_transfer && table.defocus_hand)
+    project.set("--defocus-hand", fmt::format("{}", *table.defocus_hand), path,
+                "AreAnglesInverted");
   const double pixel_A = set_pixel_size(project, table);
   if (table.thickness_A && pixel_A > 0) {
     project.set("--thickness", fmt::format("{:.0f}", *table.thickness_A / pixel_A), path,

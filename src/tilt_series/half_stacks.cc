@@ -101,9 +101,7 @@ void require_same_size(const io::ImageStack& half, const io::ImageStack& all) {
 
 HalfStacks::HalfStacks(const HalfPaths& paths, const io::ImageStack& all)
     : stacks_{io::open_image_stack(paths.even), io::open_image_stack(paths.odd)} {
-  for (const auto& stack : stacks_)
-    if (const auto contradiction = io::contradiction_of_mode(stack->header()))
-      base::log_warning(fmt::format("'{}' {}", stack->name(), *contradiction));
+  for (const auto& half : stacks_) io::warn_of_mode(half->header(), half->name());
   for (const auto& half : stacks_) require_same_size(*half, all);
 }
 

@@ -153,12 +153,6 @@ void require_whole_images(const io::ImageStack& stack) {
       stack.name()));
 }
 
-/// Warns if the header states values that its mode cannot hold.
-void warn_of_mode(const io::ImageStack& stack) {
-  if (const auto contradiction = io::contradiction_of_mode(stack.header()))
-    base::log_warning(fmt::format("'{}' {}", stack.name(), *contradiction));
-}
-
 void warn_of_sections_beyond(const TiltSeriesOptions& options, const io::ImageStack& stack) {
   const auto facts = facts_of(options, stack);
   if (!facts || facts->sections_beyond == 0) return;
@@ -332,7 +326,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
     if (options.starts_raw && !axis && !alignment) warn_of_unknown_axis(stack);
     warn_of_sections_beyond(options, stack);
     warn_of_headers(options, stack, mdoc);
-    warn_of_mode(stack);
+    io::warn_of_mode(header, stack.name());
   }
 
   plan.angle_source = angles.source;

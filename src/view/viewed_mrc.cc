@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/log.h"
 #include "base/system/memory.h"
 #include "base/threads/parallel.h"
 #include "io/images/mrc.h"
@@ -27,8 +26,7 @@ class ViewedMrc : public ViewedVolume {
     title_ = path.filename().string();
     size_ = {header.nx, header.ny, header.nz};
     voxel_size_A_ = io::cubic_voxel_size_A(header, path);
-    if (const auto contradiction = io::contradiction_of_mode(header))
-      base::log_warning(fmt::format("'{}' {}", path.string(), *contradiction));
+    io::warn_of_mode(header, path.string());
     contrast_ = report::contrast_of(file);
     held_ = report::reduced_size(header, most_voxels());
     if (held_ != size_) {

@@ -655,12 +655,17 @@ def test_files_of_others_that_are_called_like_its_own_stay(data, name):
     assert (results / name).read_text(encoding="utf-8") == "precious"
 
 
-def fake_sbatch(folder, answer):
-    """Returns the environment with an sbatch that answers this."""
+def sbatch_that_runs(folder, commands):
+    """Returns the environment with an sbatch that runs these commands of the shell."""
     program = pathlib.Path(folder) / "sbatch"
-    program.write_text(f"#!/bin/sh\nprintf '{answer}'\n", encoding="utf-8")
+    program.write_text(f"#!/bin/sh\n{commands}\n", encoding="utf-8")
     program.chmod(0o755)
     return {**os.environ, "PATH": f"{folder}:/usr/bin:/bin"}
+
+
+def fake_sbatch(folder, answer):
+    """Returns the environment with an sbatch that answers this."""
+    return sbatch_that_runs(folder, f"printf '{answer}'")
 
 
 def test_what_slurm_cannot_take_leaves_the_earlier_batch_as_it_is(data):
@@ -842,13 +847,6 @@ def test_a_series_that_cannot_start_fails_alone(data):
     states = {name: row["state"] for name, row in summary(results).items()}
     assert said.returncode == 1 and list(states.values()).count("failed") == 2, (said, states)
     assert "cannot be run" in "".join(row["reason"] for row in summary(results).values())
-
-
-def sbatch_that_runs(folder, commands):
-    """Returns the environment with an sbatch that runs these commands of the shell."""
-    environment = fake_sbatch(folder, "")
-    pathlib.Path(folder, "sbatch").write_text(f"#!/bin/sh\n{commands}\n", encoding="utf-8")
-    return environment
 
 
 @pytest.mark.parametrize("number, to_all", [(signal.SIGTERM, False), (signal.SIGINT, True)])

@@ -11,7 +11,6 @@
 #include <tuple>
 
 #include "base/enum_names.h"
-#include "base/log.h"
 #include "cli/commands/commands.h"
 #include "cli/options/help_formatter.h"
 #include "cli/options/project_options.h"
@@ -78,8 +77,7 @@ void print_extended_header(const io::MrcHeader& header) {
 void print_mrc(const std::filesystem::path& path) {
   const io::MrcReader reader(path);
   const io::MrcHeader& header = reader.header();
-  if (const auto contradiction = io::contradiction_of_mode(header))
-    base::log_warning(fmt::format("'{}' {}", path.string(), *contradiction));
+  io::warn_of_mode(header, path.string());
   print("{}: MRC {}\n", path.string(), header.is_volume ? "volume" : "image stack");
   print("  size             {} × {} × {} (x, y, sections)\n", header.nx, header.ny, header.nz);
   print("  values           {}{}, {}-endian\n", io::describe(header.mode),

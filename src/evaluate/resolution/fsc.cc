@@ -218,9 +218,6 @@ base::Volume read_mask(const std::filesystem::path& path, const std::filesystem:
     throw Error(fmt::format("the mask '{}' has {} voxels and '{}' {}: give a mask of that size",
                             path.string(), size(mask), second.string(), size(volume)));
   }
-  const auto quoted = [](const std::filesystem::path& file) {
-    return fmt::format("'{}'", file.string());
-  };
   constexpr double kSamePlace_A = 0.1;
   const auto of_mask = place_A(mask), of_volume = place_A(volume);
   if (of_mask && of_volume && !std::ranges::equal(*of_mask, *of_volume, [](double a, double b) {
@@ -230,7 +227,8 @@ base::Volume read_mask(const std::filesystem::path& path, const std::filesystem:
         fmt::format("the mask '{}' lies elsewhere than '{}' (ORIGIN): give one of its place",
                     path.string(), second.string()));
   base::Volume weights = read_box(mask, box);
-  require_one_voxel_size("the mask " + quoted(path), weights.voxel_size_A, quoted(second),
+  require_one_voxel_size(fmt::format("the mask '{}'", path.string()), weights.voxel_size_A,
+                         fmt::format("'{}'", second.string()),
                          io::cubic_voxel_size_A(volume.header(), second));
   require_numbers(weights, path);
   return weights;

@@ -14,6 +14,7 @@
 
 #include "base/plausible.h"
 #include "io/images/mrc_format.h"
+#include "io/tables/view_table.h"
 
 namespace tomofield::io {
 namespace {
@@ -98,7 +99,6 @@ void take_axis(double axis_deg, MrcHeader& header) {
 
 // Takes a voltage in V. Some programs have written kV.
 void take_voltage(double voltage, MrcHeader& header) {
-  constexpr base::Interval kVoltages_kV{20, 3000};
   constexpr double kVolts_in_kV = 1e3;
   for (const double voltage_kV : {voltage / kVolts_in_kV, voltage})
     if (kVoltages_kV.find(voltage_kV)) header.extended_voltage_kV = voltage_kV;

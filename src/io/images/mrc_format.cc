@@ -12,6 +12,7 @@
 #include <type_traits>
 
 #include "base/check.h"
+#include "base/log.h"
 #include "base/plausible.h"
 #include "io/is_file.h"
 #include "io/saving/positioned_file.h"
@@ -440,6 +441,11 @@ std::optional<std::string> contradiction_of_mode(const MrcHeader& header) {
       "those that do not fit are misread, so convert it (IMOD's newstack -mode 2)",
       is_byte ? 8 : 16, is_too_large ? "" : "out a", static_cast<int>(header.mode), header.min,
       header.max);
+}
+
+void warn_of_mode(const MrcHeader& header, const std::string& name) {
+  if (const auto contradiction = contradiction_of_mode(header))
+    base::log_warning(fmt::format("'{}' {}", name, *contradiction));
 }
 
 bool is_in_labels(const MrcHeader& header, std::string_view word) {

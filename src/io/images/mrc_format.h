@@ -106,6 +106,8 @@ inline constexpr const char* kLabelOfTurnedBox = "turned: ORIGIN is not its plac
 /// hold: programs have written unsigned numbers as signed ones, and the other way round. Returns
 /// nothing if it does not.
 std::optional<std::string> contradiction_of_mode(const MrcHeader& header);
+/// Warns of such a header; `name` is that of the file.
+void warn_of_mode(const MrcHeader& header, const std::string& name);
 
 /// Tells whether a label of a file has a word, such as the name of a program that has made it.
 /// `word` is in lower case; labels may be in any.
