@@ -85,7 +85,8 @@ bool align(const TiltSeries& series, const Options& options, const ProgressCallb
 
 /// Sets the number of threads that the library computes with. 0, the default, means OMP_NUM_THREADS
 /// or else the processors that this process may use. Results have the same bits for any number.
-/// Throws Error below 0 and above 1024.
+/// Throws Error below 0 and above 1024, and while another call of the library works: in another
+/// thread, or when a callback calls it.
 void set_thread_count(std::int64_t count);
 
 /// Fills in the options that follow from other options, as reconstruct() does. Those that trials on

@@ -65,7 +65,7 @@ def correlate_shells(first: npt.ArrayLike, second: npt.ArrayLike,
 
 def set_thread_count(count: int) -> None:
     """Compute with this many threads. 0, the default: OMP_NUM_THREADS, or else the processors that
-    this process may use."""
+    this process may use. Raise Error while another thread or the caller of a callback computes."""
     _core.set_thread_count(count_of(count, "the number of threads"))
 
 

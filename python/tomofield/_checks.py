@@ -17,6 +17,7 @@ Path = Union[str, "os.PathLike[str]"]
 
 LONGEST_SHOWN = 100  # characters of a value in a sentence
 NUMPY_DEPTH = 32  # of the sequences that numpy makes one array of
+SMALLEST_FLOAT = float(np.finfo(np.float32).tiny)  # in full precision
 LIMITS = ((-sys.float_info.max, sys.float_info.max), (0, 2**64 - 1), (-2**63, 2**63 - 1),
           (-2**31, 2**31 - 1))  # of the numbers of C++
 
@@ -36,6 +37,10 @@ def path_of(value: object, what: str) -> str:
         path = os.fsdecode(value)  # type: ignore[arg-type]
     except TypeError:
         raise TypeError(f"{what} is a path, a str or a pathlib.Path, not {shown(value)}") from None
+    try:
+        os.fsencode(path)
+    except UnicodeEncodeError:
+        raise Error(f"{what} cannot be {shown(path)}: no path holds such a character") from None
     if "\0" in path:
         raise Error(f"{what} cannot be {shown(path)}: no path holds a null character")
     return path
@@ -105,7 +110,7 @@ def array_of(value: Any, numbers: Type[Any] = np.float32) -> Any:
         raise Error(f"there is too little memory for an array of {array.size} numbers")
     if numbers is np.float32 and array.dtype.kind in "iuf" and array.dtype.itemsize > 2:
         _made("an array of real numbers is needed", _require_differences, np.asarray(array))
-    with np.errstate(over="raise"):
+    with np.errstate(all="ignore", over="raise"):
         return _made(f"an array of type {array.dtype} has numbers that are too large",
                      np.require, array, numbers, ("C", "A", "E"))
 
@@ -163,25 +168,37 @@ def _is_number(value: object, types: Tuple[type, ...]) -> bool:
 
 def as_array(value: object) -> Any:
     """Return an array with its mask, if it has one; one without numbers for what is no array, which
-    the compiled part refuses."""
+    the compiled part refuses. Raise Error with the reason of an array that cannot be read."""
     try:
         return np.asanyarray(value)
-    except Exception:  # of any object's own method
+    except MemoryError as error:
+        raise Error(f"there is too little memory for an array: {error}") from None
+    except Exception as error:  # of any object's own method
+        if hasattr(value, "__array__"):
+            raise Error(f"an array of type {type(value).__name__} cannot be read: {shown(error)}"
+                        ) from None
         return np.empty(0, object)
 
 
 def _require_differences(array: Any) -> None:
-    """Refuse numbers that 32-bit floats would round to steps which are as large as their
-    differences, section by section."""
+    """Refuse numbers that 32-bit floats would round to zeros, or to steps which are as large as
+    their differences, section by section."""
     if array.dtype == np.float32 or array.ndim < 2:
         return
+    largest_of_all = 0.0
     with np.errstate(all="ignore"):
         for section in array:
-            largest, spread = np.abs(section).max(initial=0), float(np.std(section))
-            if 0 < spread < 2 * 2.0**-23 * float(largest):
+            section = section[np.isfinite(section)]
+            largest = float(np.abs(section).max(initial=0))
+            spread = float(np.std(section)) if section.size else 0.0
+            largest_of_all = max(largest_of_all, largest)
+            if 0 < spread < 2 * 2.0**-23 * largest:
                 raise Error(f"an array of type {array.dtype} has numbers up to {largest:.3g} that "
                             f"differ by {spread:.3g}, which is lost in the 32-bit floats that are "
                             "computed with: subtract their mean")
+    if 0 < largest_of_all < SMALLEST_FLOAT:
+        raise Error(f"an array of type {array.dtype} has numbers up to {largest_of_all:.3g}, which "
+                    "32-bit floats do not hold: multiply them by a number")
 
 
 def _made(otherwise: str, make: Callable[..., Any], *arguments: Any) -> Any:

@@ -66,7 +66,10 @@ class Tomogram:
         at = self.shape[along] // 2 if index is None else whole_number_of(index, "index")
         if not -self.shape[along] <= at < self.shape[along]:
             raise Error(f"there is no section {at} across {axis}: there are {self.shape[along]}")
-        return np.asarray(np.take(self.values, at, axis=along), np.float32)
+        values = np.take(self.values, at, axis=along)
+        if is_masked(values):
+            raise Error("a tomogram has no masked voxels: fill them (numpy.ma.filled)")
+        return np.asarray(values, np.float32)
 
     def write(self, path: Path, *, overwrite: bool = False) -> None:
         """Write an MRC file of 32-bit floats."""

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "base/progress.h"
+#include "base/threads/parallel.h"
 #include "io/images/image_stack.h"
 #include "tomofield/reconstruct.h"
 
@@ -47,6 +48,9 @@ class OneAtATime {
   ~OneAtATime();
   OneAtATime(const OneAtATime&) = delete;
   OneAtATime& operator=(const OneAtATime&) = delete;
+
+ private:
+  base::ThreadsInUse threads_;
 };
 
 }  // namespace api

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "base/threads/parallel.h"
 #include "option_table/setting.h"
 #include "option_table/values.h"
 #include "projects/project.h"
@@ -12,6 +13,7 @@
 namespace tomofield {
 
 Project open_project(const ProjectRequest& request) {
+  const base::ThreadsInUse threads;
   std::error_code unknown;
   if (!std::filesystem::exists(request.path, unknown))
     throw Error(fmt::format("there is no '{}': give a project, its folder or a stack",

@@ -6,6 +6,7 @@
 
 #include "base/plausible.h"
 #include "base/system/memory.h"
+#include "base/threads/parallel.h"
 #include "exchange/model_export.h"
 #include "io/images/mrc.h"
 #include "io/images/mrc_format.h"
@@ -40,6 +41,7 @@ exchange::ExportFiles files_of(const Model& model, const VolumeFile& file) {
 }  // namespace
 
 void export_volume(const Model& model, const VolumePlace& place, const VolumeFile& file) {
+  const base::ThreadsInUse threads;
   if (place.box && place.level && place.box->euler_deg != SampleBox{}.euler_deg)
     throw Error("a box that has angles of its own cannot be levelled (--rotate, --level)");
   const exchange::ExportFiles files = files_of(model, file);
@@ -62,6 +64,7 @@ Levelling found_levelling(const Model& model) {
 
 CutParticles export_particles(const Model& model, const ParticleCuts& cuts,
                               const VolumeFile& file) {
+  const base::ThreadsInUse threads;
   exchange::ExportFiles files = files_of(model, file);
   files.particles = cuts.list;
   const std::vector<io::OutputLock> locks = exchange::claim_export(files, kAdvice);
@@ -73,6 +76,7 @@ CutParticles export_particles(const Model& model, const ParticleCuts& cuts,
 }
 
 Tomogram read_mrc(const std::filesystem::path& path) {
+  const base::ThreadsInUse threads;
   const io::MrcReader file(path);
   const io::MrcHeader& header = file.header();
   const auto section = static_cast<std::size_t>(header.nx * header.ny);
@@ -90,6 +94,7 @@ Tomogram read_mrc(const std::filesystem::path& path) {
 }
 
 void write_mrc(const Tomogram& volume, const std::filesystem::path& path, bool overwrite) {
+  const base::ThreadsInUse threads;
   const auto [nx, ny, nz] = volume.size;
   if (!base::is_plausible_pixel_size(volume.voxel_size_A))
     throw Error(fmt::format("voxels of {} Å cannot be written: give their size, from {} to {} Å",

@@ -86,15 +86,30 @@ Script name_for_sbatch(const fs::path& path, std::string_view advice) {
                   io::quote(name), advice));
 }
 
+// Tells whether a word names an option of sbatch that the batch sets itself. sbatch takes the
+// beginning of a name for it, and a value right behind a letter.
+bool is_own_option(std::string_view word) {
+  constexpr std::array<std::string_view, 9> kOwn{"--array",     "--ntasks",   "--chdir",
+                                                 "--output",    "--signal",   "--wrap",
+                                                 "--test-only", "--parsable", "--dependency"};
+  constexpr std::string_view kLetters = "anDod";  // of the same
+  constexpr std::size_t kShortest = 4;            // "--ar"
+  if (word.starts_with("--")) {
+    const std::string_view name = word.substr(0, word.find('='));
+    const auto begins = [&](std::string_view own) {
+      return name.size() >= kShortest && own.starts_with(name);
+    };
+    return std::ranges::any_of(kOwn, begins);
+  }
+  return word.size() > 1 && word[0] == '-' && kLetters.find(word[1]) != std::string_view::npos;
+}
+
 // Returns an option of the user for sbatch, which is one line of the script.
 Script line_for_sbatch(const std::string& option) {
-  constexpr std::array<std::string_view, 13> kOwn{
-      "--array", "-a",       "--ntasks", "-n",          "--chdir",    "-D",          "--output",
-      "-o",      "--signal", "--wrap",   "--test-only", "--parsable", "--dependency"};
-  const std::string_view name = std::string_view(option).substr(0, option.find_first_of("= "));
-  if (std::ranges::find(kOwn, name) != kOwn.end())
-    throw Error(fmt::format("--sbatch {}: the batch sets {} itself, so leave it out",
-                            io::quote(option), io::quote(name)));
+  for (const std::string_view word : io::split_words(option))
+    if (is_own_option(word))
+      throw Error(fmt::format("--sbatch {}: the batch sets {} itself, so leave it out",
+                              io::quote(option), io::quote(word.substr(0, word.find('=')))));
   if (std::ranges::none_of(option, [](unsigned char c) { return c < ' ' || c == 0x7f; }))
     return Script::made(option);
   throw Error(

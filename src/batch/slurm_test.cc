@@ -74,10 +74,14 @@ TEST(SlurmScript, HasNoLineThatANameMade) {
   EXPECT_THROW(
       slurm_script({.program = "p", .folder = "/data", .more = {"--mem=1G\nrm x"}}, {job(1, 1)}),
       Error);
-  for (const char* own : {"--signal=B:USR1@600", "--output=x", "--array=1-2%1", "-n 2", "--wrap=x"})
+  for (const char* own : {"--signal=B:USR1@600", "--output=x", "--array=1-2%1", "-n 2", "--wrap=x",
+                          "-a1-3", "--arr=1", "--time=5 --test-only", "-d afterok:1", "--out x"})
     EXPECT_THROW(slurm_script({.program = "p", .folder = "/data", .more = {own}}, {job(1, 1)}),
                  Error)
         << own;
+  for (const char* other : {"--ntasks-per-node=1", "-p cpu --nodelist=n1", "--open-mode=append"})
+    EXPECT_NO_THROW(slurm_script({.program = "p", .folder = "/data", .more = {other}}, {job(1, 1)}))
+        << other;
 }
 
 // Sets variables of the environment for one test.

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "base/log.h"
+#include "batch/choice.h"
 #include "batch/slurm.h"
 #include "batch/summary.h"
 #include "tomofield/error.h"
@@ -86,6 +87,9 @@ TaskResult run_task(const RunOptions& options, const JobList& list, int number, 
       submit_again(options.folder, number, result);
     }
   }
+  if (result.state.progress == Progress::kDone && list.chooses && !read_choice(options.folder))
+    result.state.reason =
+        "the task that chooses for all series made no choice, so this series chose for itself";
   write_state(options.folder, job, result.state);
   write_summary(options.folder, list.jobs);
   return result;

@@ -158,6 +158,10 @@ TEST_F(Checkpoint, AStateThatTheSeriesAndTheOptionsCannotHaveIsRefused) {
       [](State& s) { s.doubles["views"].resize(3); },
       [&](State& s) { s.doubles["views"][0] = nan; },
       [](State& s) { s.doubles["views"][2] = 0; },
+      [](State& s) { s.doubles["views"][0] = 0; },  // the scale of the first view
+      [](State& s) { s.doubles["views"][0] = -1; },
+      [](State& s) { s.doubles["views"][0] = 1e30; },
+      [](State& s) { s.doubles["views"][1] = 1e300; },
       [](State& s) { s.doubles["epoch_sums"].resize(6); },
       [&](State& s) { s.doubles["epoch_sums"][1] = nan; },
       [&](State& s) { s.doubles["epoch_sums"][6] = nan; },  // the limited squares of the first view

@@ -3,8 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "evaluate/speckle.h"
+#include "evaluate/volume_pair.h"
+#include "io/images/mrc.h"
 #include "output/model_file.h"
 #include "output/output_paths.h"
 #include "output/volume.h"
@@ -22,8 +26,27 @@ bool fits(const output::ModelOutline& model, const base::Shape3& shape) {
   return box.is_aligned() && box.size == std::array{shape.nx, shape.ny, shape.nz};
 }
 
-void require_fit(const output::ModelOutline& model, const fs::path& path,
-                 const base::Shape3& shape) {
+// Returns true if a volume was turned, or lies elsewhere than the region of a model, as its header
+// says.
+bool lies_elsewhere(const output::ModelOutline& model, const fs::path& path) {
+  const io::MrcReader volume(path);
+  if (is_turned(volume)) return true;
+  const auto place = place_A(volume);
+  if (!place) return false;
+  const std::array<std::int64_t, 3> corner{model.roi.x0, model.roi.y0, 0};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (std::fabs((*place)[axis] / model.pixel_size_A - static_cast<double>(corner[axis])) > 0.5)
+      return true;
+  return false;
+}
+
+void require_fit(const output::ModelOutline& model, const fs::path& path, const base::Shape3& shape,
+                 const fs::path& volume) {
+  if (fits(model, shape) && lies_elsewhere(model, volume))
+    throw Error(
+        fmt::format("'{}' was turned, or is another part than the region of the model '{}', as its "
+                    "header says: give the volume that was written with the model",
+                    volume.string(), path.string()));
   if (fits(model, shape)) return;
   const auto size = output::region_box(model, 1.0).size;
   throw Error(fmt::format(
@@ -40,7 +63,7 @@ std::optional<output::ModelOutline> model_beside(const fs::path& volume,
   if (!fs::exists(path)) return std::nullopt;
   try {
     output::ModelOutline model = output::load_outline(path);
-    if (fits(model, shape)) return model;
+    if (fits(model, shape) && !lies_elsewhere(model, volume)) return model;
   } catch (const Error&) {  // another program's file; nobody asked for it
   }
   return std::nullopt;
@@ -54,7 +77,7 @@ Artefacts find_artefacts(const base::Volume& volume, const fs::path& path,
   std::optional<output::ModelOutline> outline;
   if (model) {
     outline = output::load_outline(*model);
-    require_fit(*outline, *model, volume.shape);
+    require_fit(*outline, *model, volume.shape, path);
   } else {
     outline = model_beside(path, volume.shape);
   }

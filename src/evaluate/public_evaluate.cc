@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/plausible.h"
+#include "base/threads/parallel.h"
 #include "evaluate/resolution/fsc.h"
 #include "evaluate/similarity.h"
 #include "tomofield/error.h"
@@ -44,6 +45,7 @@ evaluate::VolumePair pair_of(const Tomogram& first, const char* first_name, cons
 }  // namespace
 
 VolumeScores score_volume(const Tomogram& volume, const Tomogram& truth) {
+  const base::ThreadsInUse threads;
   const evaluate::Comparison score = evaluate::compare(pair_of(volume, "volume", truth, "truth"));
   return {.psnr_raw_dB = score.psnr.raw_dB,
           .psnr_affine_dB = score.psnr.affine_dB,
@@ -56,6 +58,7 @@ VolumeScores score_volume(const Tomogram& volume, const Tomogram& truth) {
 }
 
 ShellCorrelation correlate_shells(const Tomogram& first, const Tomogram& second) {
+  const base::ThreadsInUse threads;
   const auto pair = pair_of(first, "first volume", second, "second volume");
   if (!(pair.second.voxel_size_A > 0.0))
     throw Error(

@@ -131,19 +131,27 @@ void check_volume(const base::Volume& volume, const measurement::Measurement& se
   }
 }
 
-// Throws Error if a volume of tomofield states another place than the region of the views.
+// Throws Error if a volume of tomofield states another place than the region of the views, from the
+// lower face of the specimen on.
 void require_place(const std::filesystem::path& path, const measurement::Measurement& series) {
-  const auto place = place_A(io::MrcReader(path));
+  const io::MrcReader volume(path);
+  if (is_turned(volume))
+    throw Error(fmt::format(
+        "'{}' was turned before it was sampled, and is projected as it lies in the views: give "
+        "the volume that `reconstruct` wrote, or `export` without an angle",
+        path.string()));
+  const auto place = place_A(volume);
   if (!place) return;
-  const std::array<std::int64_t, 2> corner{series.roi.x0, series.roi.y0};
-  for (std::size_t axis = 0; axis < 2; ++axis) {
+  const std::array<std::int64_t, 3> corner{series.roi.x0, series.roi.y0, 0};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
     const double stated_px = (*place)[axis] / series.pixel_size_A;
     if (std::fabs(stated_px - static_cast<double>(corner[axis])) < 0.5) continue;
-    throw Error(
-        fmt::format("'{}' begins at {:.4g}, {:.4g} pixels of the views (ORIGIN), and the region at "
-                    "{}, {}: give the --roi that it was made with",
-                    path.string(), (*place)[0] / series.pixel_size_A,
-                    (*place)[1] / series.pixel_size_A, corner[0], corner[1]));
+    throw Error(fmt::format(
+        "'{}' begins at {:.4g}, {:.4g}, {:.4g} pixels of the views (ORIGIN), and the "
+        "region at {}, {}, 0: give the --roi that it was made with, and its whole "
+        "thickness",
+        path.string(), (*place)[0] / series.pixel_size_A, (*place)[1] / series.pixel_size_A,
+        (*place)[2] / series.pixel_size_A, corner[0], corner[1]));
   }
 }
 

@@ -31,10 +31,6 @@ double common_voxel_size_A(const io::MrcReader& first, const io::MrcReader& seco
 // The voxel of `b` on which the first voxel of `a` lies.
 using Offset = std::array<std::int64_t, 3>;
 
-bool is_turned(const io::MrcReader& volume) {
-  return std::ranges::count(volume.header().labels, io::kLabelOfTurnedBox) > 0;
-}
-
 // Warns of a volume that has no place, because it was turned.
 void warn_of_turned(const io::MrcReader& volume) {
   base::log_warning(fmt::format(
@@ -78,6 +74,11 @@ std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcRead
         "'{}' and '{}' are of two places of one volume: the latter begins {}, {}, {} voxels after "
         "the former (ORIGIN), so give volumes of one region",
         a.path().string(), b.path().string(), -offset[0], -offset[1], -offset[2]));
+  if (size_a == size_b && offset != Offset{})
+    base::log_info(fmt::format(
+        "'{}' begins {}, {}, {} voxels after '{}' by their ORIGINs, of which one or both are of "
+        "other programs: the volumes count as of one region",
+        b.path().string(), -offset[0], -offset[1], -offset[2], a.path().string()));
   const bool says_something = offset != Offset{} || are_ours;
   if (!says_something || !(lies_in_a || lies_in_b)) return {};
   return offset;
@@ -158,6 +159,10 @@ double common_voxel_size_A(const std::string& first, double first_A, const std::
         "with voxels of {:.6g} Å",
         first_A, second_A, common_A));
   return common_A;
+}
+
+bool is_turned(const io::MrcReader& volume) {
+  return std::ranges::count(volume.header().labels, io::kLabelOfTurnedBox) > 0;
 }
 
 std::optional<std::array<double, 3>> place_A(const io::MrcReader& volume) {

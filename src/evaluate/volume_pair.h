@@ -31,6 +31,9 @@ double common_voxel_size_A(const std::string& first, double first_A, const std::
 /// it and did not turn it: its ORIGIN.
 std::optional<std::array<double, 3>> place_A(const io::MrcReader& volume);
 
+/// Tells whether tomofield turned a volume before it was sampled.
+bool is_turned(const io::MrcReader& volume);
+
 /// Throws Error if a volume is a part of another one, as its place says, or was turned: positions
 /// in the whole are not its own.
 void require_whole(const std::filesystem::path& volume);

@@ -15,8 +15,12 @@ bool are_finite(std::initializer_list<double> values) {
   return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
 }
 
+// The fit keeps scales near 1, and offsets in units of the contrast.
 bool is_sound(const measurement::ViewModel& view) {
-  return are_finite({view.scale, view.offset, view.weight}) && view.weight > 0;
+  constexpr double kLargestScale = 1e4, kLargestOffset = 1e9;
+  return view.scale >= 1 / kLargestScale && view.scale <= kLargestScale &&
+         std::fabs(view.offset) <= kLargestOffset && view.weight > 0 &&
+         std::isfinite(view.weight) && view.largest_residual > 0;
 }
 
 bool is_sound(const measurement::ViewSums& sums) {

@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 
 #include "base/log.h"
+#include "io/images/view_images.h"
 #include "io/tables/alignment_files.h"
+#include "io/tables/text_lines.h"
 #include "tilt_series/contradictions.h"
 #include "tilt_series/match_by_tilt.h"
 #include "tomofield/error.h"
@@ -55,6 +58,61 @@ std::optional<RowOfSection> rows_by_rank(const Sections& sections, const RowsOfV
   return rows;
 }
 
+// An image as a table or a stack names it: without folders and endings, which programs change.
+struct ImageKey {
+  std::string stem;
+  std::optional<std::int64_t> section;  // of a stack
+
+  explicit ImageKey(const std::string& name) {
+    const io::ImageInFile image = io::parse_image_name(name);
+    stem = image.file.stem().string();
+    section = image.section;
+  }
+  bool operator==(const ImageKey&) const = default;
+};
+
+// Returns the row for each section by a comparison of their keys; nothing if a section that is used
+// has no row, or several.
+template <typename IsSame>
+std::optional<RowOfSection> rows_by_key(const Sections& sections, const std::vector<ImageKey>& rows,
+                                        const IsSame& is_same) {
+  RowOfSection found(static_cast<std::size_t>(sections.count));
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const ImageKey key(sections.images[i]);
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+      if (!is_same(key, rows[row])) continue;
+      if (found[i]) return std::nullopt;
+      found[i] = row;
+    }
+    if (!found[i] && sections.tilt_deg[i]) return std::nullopt;
+  }
+  return found;
+}
+
+// Returns the rows by the images that they name. Sections of a stack of another name count by their
+// numbers, with a warning. Nothing if the names do not tell.
+std::optional<RowOfSection> rows_by_image(const Sections& sections, const RowsOfViews& table) {
+  if (sections.images.empty() || table.images.empty() || table.images.size() != table.count)
+    return std::nullopt;
+  const std::vector<ImageKey> keys(table.images.begin(), table.images.end());
+  if (const auto rows = rows_by_key(sections, keys, std::equal_to{})) return rows;
+  const auto is_of_first = [&](const ImageKey& key) {
+    return key.section && key.stem == keys.front().stem;
+  };
+  const bool is_one_stack =
+      std::ranges::all_of(keys, is_of_first) && ImageKey(sections.images.front()).section;
+  auto rows =
+      is_one_stack
+          ? rows_by_key(sections, keys,
+                        [](const ImageKey& a, const ImageKey& b) { return a.section == b.section; })
+          : std::nullopt;
+  base::log_warning(
+      fmt::format("'{}' is of other images ('{}') than '{}' and has no tilts: its rows count {}",
+                  table.file.string(), io::quote(table.images.front()), sections.stack,
+                  rows ? "by the numbers of the images" : "in their order"));
+  return rows;
+}
+
 // Returns the rows by tilt, or nothing if the tilts do not tell.
 std::optional<RowOfSection> rows_by_tilt(const Sections& sections, const RowsOfViews& table) {
   if (table.tilt_deg.empty()) return std::nullopt;
@@ -89,6 +147,10 @@ RowOfSection rows_of_whole_table(const Sections& sections, const RowsOfViews& ta
 }  // namespace
 
 RowOfSection rows_of_sections(const Sections& sections, const RowsOfViews& table) {
+  const bool has_tilts =
+      std::ranges::any_of(table.tilt_deg, [](const auto& tilt) { return tilt.has_value(); });
+  if (!has_tilts)
+    if (const auto rows = rows_by_image(sections, table)) return *rows;
   const bool is_whole = static_cast<std::int64_t>(table.count) == sections.count;
   if (!is_whole || table.is_of_aretomo)
     if (const auto rows = rows_by_aretomo(sections, table)) return *rows;

@@ -59,7 +59,9 @@ void require_pixel_size(const tilt_series::TiltSeriesOptions& input,
 Sections sections_of(const tilt_series::TiltSeriesOptions& input,
                      const tilt_series::PlannedSeries& series) {
   const io::ImageStack& stack = series.stack();
-  Sections sections{input, stack.name(), stack.header().nz, {}};
+  Sections sections{input, stack.name(), stack.header().nz, {}, {}};
+  for (std::int64_t i = 0; i < sections.count && !stack.is_in_memory(); ++i)
+    sections.images.push_back(stack.image_name(i));
   sections.tilt_deg.resize(static_cast<std::size_t>(sections.count));
   for (const tilt_series::View& view : series.views())
     sections.tilt_deg[static_cast<std::size_t>(view.section)] =
@@ -104,13 +106,15 @@ void match_sections(const Sections& sections, io::CtfTable& table) {
   const SeriesFiles& files = sections.input;
   std::error_code absent;
   if (!sections.input.images && io::is_view_table(files.stack) &&
-      std::filesystem::equivalent(io::without_half(files.stack), table.file, absent))
+      std::filesystem::equivalent(io::without_half(files.stack), table.file, absent)) {
     table.tilt_deg.clear();
+    table.images.clear();
+  }
   const auto count = static_cast<std::size_t>(sections.count);
   extend(sections, table);
-  const RowOfSection rows = rows_of_sections(
-      sections,
-      {table.file, /*is_ctf=*/true, table.is_of_aretomo, table.views.size(), table.tilt_deg});
+  const RowOfSection rows =
+      rows_of_sections(sections, {table.file, /*is_ctf=*/true, table.is_of_aretomo,
+                                  table.views.size(), table.tilt_deg, table.images});
   std::vector<std::optional<io::Defocus>> matched(count);
   for (std::size_t i = 0; i < count; ++i)
     if (rows[i]) matched[i] = table.views[*rows[i]];
@@ -159,6 +163,9 @@ std::optional<io::CtfTable> find_ctf(const SeriesFiles& files, const ViewOptions
     base::log_warning(fmt::format("'{}' has {}, which is not applied", table.file.string(), what));
   base::log_info(fmt::format("ctf: the defocus of each view from '{}'; --ctf none turns it off",
                              table.file.string()));
+  if (table.defocus_hand && !options.defocus_hand)
+    base::log_info(
+        fmt::format("ctf: --defocus-hand {} from '{}'", *table.defocus_hand, table.file.string()));
   return table;
 }
 
@@ -244,6 +251,7 @@ struct Recording {
   std::optional<Exposures> doses;               // [row]
   std::vector<std::size_t> order;               // of rows
   std::vector<std::optional<double>> tilt_deg;  // [row]; empty: not in the file
+  std::vector<std::string> images = {};         // [row]; empty: not in the file
 };
 
 // Returns the sections in the order of their exposures.
@@ -311,6 +319,20 @@ std::optional<Recording> recording_of_tilts(const std::filesystem::path& path, b
   return found;
 }
 
+// Reads the doses and the order that a table of views states which is given for its contrast
+// transfer.
+std::optional<Recording> recording_of_ctf(const std::filesystem::path& path, bool of_view) {
+  const io::CtfTable ctf = io::read_ctf(path);
+  io::ViewTable table;
+  for (const std::optional<double>& dose : ctf.dose_before) {
+    table.views.emplace_back();
+    table.views.back().dose_before = dose;
+  }
+  const auto doses = known_exposures(microscope::exposures_of(table), path, of_view);
+  if (!doses) return std::nullopt;
+  return Recording{path, doses, order_of(*doses), ctf.tilt_deg, ctf.images};
+}
+
 std::optional<Recording> find_recording(const SeriesFiles& files, const Sections& sections,
                                         bool of_view) {
   if (files.mdoc) return recording_of_mdoc(*files.mdoc, of_view);
@@ -319,8 +341,9 @@ std::optional<Recording> find_recording(const SeriesFiles& files, const Sections
                                        io::without_half(files.stack), of_view);
     if (doses) return Recording{files.stack, doses, order_of(*doses), {}};
   }
-  if (files.tlt) return recording_of_tilts(*files.tlt, of_view);
-  return std::nullopt;
+  if (files.tlt)
+    if (auto found = recording_of_tilts(*files.tlt, of_view)) return found;
+  return has_ctf_file(files) ? recording_of_ctf(*files.ctf, of_view) : std::nullopt;
 }
 
 // Refuses exposures in which no specimen keeps a signal.
@@ -367,8 +390,10 @@ std::optional<Exposures> find_exposures(const SeriesFiles& files, const ViewOpti
       of_view ? microscope::exposures_in_order(recording->order, *of_view) : *recording->doses;
   require_bearable(of_row,
                    of_view ? "--dose-per-tilt" : fmt::format("'{}'", recording->file.string()));
-  const auto rows = rows_of_sections(
-      sections, {.file = recording->file, .count = of_row.size(), .tilt_deg = recording->tilt_deg});
+  const auto rows = rows_of_sections(sections, {.file = recording->file,
+                                                .count = of_row.size(),
+                                                .tilt_deg = recording->tilt_deg,
+                                                .images = recording->images});
   Exposures of_section(static_cast<std::size_t>(sections.count));
   for (std::size_t i = 0; i < of_section.size(); ++i)
     if (rows[i]) of_section[i] = of_row[*rows[i]];
@@ -396,7 +421,7 @@ void set_defocus(const ViewOptions& options, int hand, const tilt_series::Planne
         fmt::format("'{}' has no defocus of section {}: add it, or leave the section out "
                     "with --exclude {}",
                     ctf.file.string(), of.section + 1, of.section + 1));
-  const bool is_right = options.defocus_hand.value_or(hand) > 0;
+  const bool is_right = options.defocus_hand.value_or(ctf.defocus_hand.value_or(hand)) > 0;
   const auto side = is_right ? microscope::DefocusHand::kRight : microscope::DefocusHand::kLeft;
   transfer.defocus = microscope::aligned_defocus(*recorded, series.raw_from_aligned(view));
   transfer.slope = microscope::slope_of_tilt(of.tilt_deg, series.pixel_size_A(), side);
@@ -420,8 +445,14 @@ void require_rings(const tilt_series::PlannedSeries& series, const tilt_series::
 }
 
 // Warns of corrections that a stack has had, as its labels say, and that are applied all the same.
-void warn_of_labels(const io::ImageStack& stack, bool corrects_ctf, bool corrects_dose) {
-  if (corrects_ctf && io::is_in_labels(stack.header(), "ctfphaseflip"))
+void warn_of_labels(const io::ImageStack& stack, bool corrects_ctf, bool corrects_dose,
+                    bool corrects_detector) {
+  if (corrects_detector && io::is_in_labels(stack.header(), "inverse of mtf"))
+    base::log_warning(fmt::format(
+        "'{}' was filtered by the inverse of the detector's transfer function (mtffilter), as its "
+        "header says, and --mtf divides by it again: leave --mtf out",
+        stack.name()));
+  if (corrects_ctf && io::is_phase_flipped(stack.header()))
     base::log_warning(fmt::format(
         "'{}' went through ctfphaseflip, as its header says, and its views count as not corrected: "
         "give --ctf-phase-flipped",
@@ -467,8 +498,9 @@ std::vector<microscope::ViewTransfer> view_transfers(const tilt_series::TiltSeri
   require_pixel_size(input, series, sections.stack);
   const auto ctf = find_ctf(files, options, sections);
   const auto exposures = find_exposures(files, options, sections);
-  warn_of_labels(series.stack(), ctf && !options.is_phase_flipped, exposures.has_value());
   const auto detector = find_detector(files, series);
+  warn_of_labels(series.stack(), ctf && !options.is_phase_flipped, exposures.has_value(),
+                 detector != nullptr);
   if (!ctf && !exposures && !detector) return {};
   const microscope::Optics optics = find_optics(files, options, ctf, series);
   std::vector<microscope::ViewTransfer> transfers(series.views().size());

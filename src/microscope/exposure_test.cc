@@ -158,6 +158,14 @@ TEST(ExposuresOfMdoc, AreUnknownIfTimesGiveNoOrder) {
   EXPECT_EQ((*told.of_view)[0].before, 3.0);
 }
 
+TEST(ExposuresOfMdoc, AreNotThoseOfFrames) {
+  const std::string known = "FrameDosesAndNumber = 0.1 30";
+  EXPECT_NE(without_times({known, known, known}).fault.find("FrameDosesAndNumber"),
+            std::string::npos);
+  const std::string none = "ExposureDose = 0\nFrameDosesAndNumber = 0 30";
+  EXPECT_EQ(without_times({none, none, none}).fault, "");
+}
+
 TEST(ExposuresOfMdoc, SaysWhatIsMissing) {
   const std::string dose = "ExposureDose = 3";
   EXPECT_EQ(without_times({dose, "ExposureDose = 0", dose}).fault,

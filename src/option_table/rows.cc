@@ -136,7 +136,7 @@ constexpr Row kRows[] = {
      .help = "The phases of the stack were flipped already: the contrast transfer is |CTF|"},
     {.key = "input.defocus_hand", .flag = "--defocus-hand", MEMBER(options.views, defocus_hand),
      .group = Group::kTransfer, .range = Range::either(1, -1),
-     .automatic = "that of a RELION project, else --hand",
+     .automatic = "that of a RELION project or of Warp's file, else --hand",
      .help = "Side of a view at a positive tilt that is farther from focus: 1 is the right one, -1 the "
              "left one. rlnTomoHand has the opposite sign"},
     {.key = "input.mtf", .flag = "--mtf", MEMBER(files, mtf), .group = Group::kTransfer,

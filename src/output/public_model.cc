@@ -7,6 +7,7 @@
 #include <memory>
 #include <utility>
 
+#include "base/threads/parallel.h"
 #include "field/sampling/sample_box.h"
 #include "output/sample_model.h"
 #include "output/volume.h"
@@ -84,7 +85,10 @@ Tomogram sample_tomogram(const output::Model& model, bool invert) {
 Model::Model(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 
 Model::Model(const std::filesystem::path& path)
-    : impl_(std::make_shared<Impl>(Impl{output::load_to_sample(path), path})) {}
+    : impl_([&] {
+        const base::ThreadsInUse threads;
+        return std::make_shared<Impl>(Impl{output::load_to_sample(path), path});
+      }()) {}
 
 double Model::pixel_size_A() const { return impl_->model.pixel_size_A; }
 
@@ -99,6 +103,7 @@ SampleBox Model::region(double voxel_px) const {
 }
 
 std::vector<float> Model::sample(const SampleBox& box) const {
+  const base::ThreadsInUse threads;
   const field::OrientedBox oriented = oriented_box(box);
   field::require_memory_of(oriented);
   output::announce_sampling(impl_->model, oriented);
@@ -108,6 +113,7 @@ std::vector<float> Model::sample(const SampleBox& box) const {
 }
 
 std::vector<float> Model::sample_points(std::span<const Point> points) const {
+  const base::ThreadsInUse threads;
   for (const Point& point : points)
     if (!std::ranges::all_of(point, [](double number) { return std::isfinite(number); }))
       throw Error(

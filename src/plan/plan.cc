@@ -138,6 +138,8 @@ RunPlan plan_run(const tilt_series::PlannedSeries& series, const options::Recons
   run.roi = plan.roi;
   run.thickness = plan.geometry.thickness;
   run.num_leaves = domain.tree.num_leaves();
+  run.has_large_leaves =
+      domain.tree.roots().cell_size > std::max(plan.roi.width(), plan.roi.height());
   run.num_parameters = max_parameters(domain, options.field, options.field.kind);
   run.stages = fit::make_stages(options.field, options.fit);
   const fit::Stage& last = run.stages.back();
@@ -150,9 +152,10 @@ RunPlan plan_run(const tilt_series::PlannedSeries& series, const options::Recons
   run.memory_bytes = run.tiles.is_used()
                          ? run.tiles.memory_bytes
                          : estimate_memory({series, plan, domain, options, processes}, run.stages);
-  if (run.num_trials > 0 && !plan.ray_geometry)
+  if (const int most_trials = given.num_trials(num_fitted_views(plan, given.fit), open);
+      most_trials > 0 && !plan.ray_geometry)
     run.memory_bytes =
-        std::max(run.memory_bytes, memory_of_trials(plan, options, run.num_trials, processes));
+        std::max(run.memory_bytes, memory_of_trials(plan, options, most_trials, processes));
   run.most_vertices = most_vertices(domain);
   if (aligns && !plan.ray_geometry)
     run.memory_bytes =
@@ -166,10 +169,15 @@ RunPlan plan_run(const tilt_series::PlannedSeries& series, const options::Recons
 }
 
 void require_memory(const RunPlan& plan, const distributed::Communicator& processes) {
-  base::require_memory(plan.memory_bytes * static_cast<std::size_t>(processes.size_on_machine()),
-                       "this reconstruction",
-                       "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, "
-                       "fewer --threads, or --budget, which fits tiles and makes them compact");
+  base::require_memory(
+      plan.memory_bytes * static_cast<std::size_t>(processes.size_on_machine()),
+      "this reconstruction",
+      plan.has_large_leaves
+          ? "use a smaller --leaf-size: leaves are larger than the region, and "
+            "take the memory of their whole area"
+          : "use a larger --bin or --vertex-spacing, a smaller --roi or "
+            "--thickness, fewer --threads, or --budget, which fits tiles and makes "
+            "them compact");
 }
 
 RunPlan require_possible_run(const tilt_series::PlannedSeries& series,

@@ -21,6 +21,7 @@ struct RunPlan {
   Rectangle roi;
   double thickness = 0;
   int num_leaves = 0;              ///< at the start
+  bool has_large_leaves = false;   ///< a root cell reaches beyond the region along both axes
   int most_vertices = 0;           ///< along an axis of a leaf
   std::size_t num_parameters = 0;  ///< max. during the last stage
   int num_trials = 0;              ///< expected number of short fits that choose settings

@@ -72,6 +72,21 @@ TEST_F(Plan, BinnedViewsAndARegionOfInterestAreSmaller) {
   EXPECT_EQ(run.roi.height(), 20);
 }
 
+TEST_F(Plan, CountsTheMemoryOfTrialsThatTheViewsMayAskFor) {
+  options_.fit.spike_rank = 3;
+  options_.fit.density_variation = 5;
+  options_.fit.prior = Prior::kTv;
+  options_.field.leaf_size = 512;
+  options_.views.black_level = 0.0;
+  options_.views.bead_diameter_nm = 0.0;
+  const std::size_t without = plan().memory_bytes;
+  EXPECT_TRUE(plan().has_large_leaves);
+  options_.views.black_level = {};  // a background, if there is one
+  EXPECT_GT(plan().memory_bytes, without + without / 2);
+  options_.field.leaf_size = 32;
+  EXPECT_FALSE(plan().has_large_leaves);
+}
+
 TEST_F(Plan, CountsTheStepsOfAllStages) {
   EXPECT_EQ(plan().num_steps, 5 * 4);
   options_.fit.coarse_epochs = 8;
@@ -137,6 +152,8 @@ TEST_F(Plan, CountsTheMomentsOfLeavesThatRaysMeetAlone) {
   options_.field.kind = FieldKind::kGrid;
   options_.field.rank = 4;
   options_.specimen.roi = Rectangle{0, 0, 16, 16};
+  options_.views.black_level = 0.0;
+  options_.views.bead_diameter_nm = 0.0;
   const RunPlan run = plan();
   ASSERT_EQ(run.num_trials, 0);
   EXPECT_GE(run.memory_bytes, 7 * run.num_parameters);   // all parameters, and 3 more of a quarter

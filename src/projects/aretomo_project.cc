@@ -37,12 +37,6 @@ void read_aretomo_project(Project& project) {
     project.warn(fmt::format("'{}': the tilts of its rows include AlphaOffset, {}°, already",
                              aln.string(), alignment.alpha_offset_deg));
   }
-  if (alignment.beta_offset_deg != 0) {
-    project.warn(
-        fmt::format("'{0}': BetaOffset, {1}°, is not applied, as in AreTomo's own volumes "
-                    "(--x-axis-tilt turns the specimen about X)",
-                    aln.string(), alignment.beta_offset_deg));
-  }
 }
 
 }  // namespace tomofield::projects

@@ -220,7 +220,7 @@ ImodImages read_aligned(Project& project, const NamedFile& aligned, CommandEntri
   images.num_sections = stack->header().nz;
   images.pixel_size_A = stack->header().voxel_size_A[0];
   images.series_name = series_name_of(tilt);
-  images.is_phase_flipped = io::is_in_labels(stack->header(), "ctfphaseflip");
+  images.is_phase_flipped = io::is_phase_flipped(stack->header());
   images.bin = images.unit = find_bin(project, tilt, newst, false);
   images.width = images.imod_width = static_cast<double>(stack->header().nx) * images.unit;
   images.height = images.imod_height = static_cast<double>(stack->header().ny) * images.unit;

@@ -126,6 +126,7 @@ void read_relion_project(Project& project) {
   for (const std::string& what : tomogram.not_applied)
     project.warn(fmt::format("'{}', tomogram {}: {}, which is not applied", star.string(),
                              tomogram.name, what));
+  if (tomogram.remark) project.warn(fmt::format("'{}': {}", star.string(), *tomogram.remark));
   if (tomogram.defocus_slope.value_or(1.0) != 1.0)
     project.warn(
         fmt::format("'{}', tomogram {}: _rlnTomoDefocusSlope {} is not applied: the "

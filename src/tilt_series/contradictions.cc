@@ -153,6 +153,13 @@ void warn_of_other_axis(const StatedAxis& stated, double aligned_axis_deg,
     base::log_warning(*found);
 }
 
+void warn_of_other_line(const StatedAxis& stated, double aligned_axis_deg,
+                        const TiltSeriesOptions& options, const io::ImageStack& stack) {
+  const double difference_deg = angle_between_axes(stated.angle_deg, aligned_axis_deg);
+  if (difference_deg < 180.0 - kLargestAxisChange_deg)
+    warn_of_other_axis(stated, aligned_axis_deg, options, stack);
+}
+
 void warn_of_turned_views(const Angles& axes_deg, double mean_deg, const TiltSeriesOptions& options,
                           const io::ImageStack& stack) {
   constexpr double kLargestTurn_deg = 20.0;

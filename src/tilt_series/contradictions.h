@@ -49,6 +49,10 @@ std::optional<std::string> contradiction_of_axis(const StatedAxis& stated, doubl
 void warn_of_other_axis(const StatedAxis& stated, double aligned_axis_deg,
                         const TiltSeriesOptions& options, const io::ImageStack& stack);
 
+/// Does the same for an axis that may be the opposite one.
+void warn_of_other_line(const StatedAxis& stated, double aligned_axis_deg,
+                        const TiltSeriesOptions& options, const io::ImageStack& stack);
+
 /// Warns if an alignment turns some views by another axis than the mean.
 void warn_of_turned_views(const Angles& axes_deg, double mean_deg, const TiltSeriesOptions& options,
                           const io::ImageStack& stack);

@@ -73,6 +73,16 @@ void require_varying(std::span<const std::int64_t> sections, std::span<const Hal
       constant.size() == 1 ? "is" : "are", constant.size() == 1 ? "it" : "them"));
 }
 
+// Refuses two stacks of equal pixels: halves have noise of their own.
+void require_apart(std::span<const HalfMoments> moments, double HalfMoments::*num_apart,
+                   const std::string& half, const std::string& other) {
+  if (std::ranges::any_of(moments, [&](const HalfMoments& m) { return m.*num_apart > 0; })) return;
+  throw Error(
+      fmt::format("all pixels of '{}' and '{}' are equal, so they have the same noise: give the "
+                  "even and the odd frames of the series",
+                  half, other));
+}
+
 // Refuses a sum of halves that does not look like all frames, and warns of one that roughly does.
 void require_alike(double correlation, const std::string& halves, const std::string& all) {
   if (!(correlation >= kLeastCorrelation)) {
@@ -121,6 +131,9 @@ HalfMoments HalfStacks::measure(std::int64_t section, const MaskedImage& all) co
     m.all += a;
     m.even += e;
     m.odd += o;
+    m.num_between += e != o ? 1 : 0;
+    m.num_even_apart += e != a ? 1 : 0;
+    m.num_odd_apart += o != a ? 1 : 0;
   });
   const auto num_measured =
       std::ranges::count_if(all.valid, [](std::uint8_t state) { return state != kNoMeasurement; });
@@ -145,6 +158,10 @@ void HalfStacks::match(std::span<const std::int64_t> sections, std::span<const H
     require_finite(moments[i], sections[i], names, all.name());
   require_varying(sections, moments, &HalfMoments::even_squares, stack(Half::kEven).name());
   require_varying(sections, moments, &HalfMoments::odd_squares, stack(Half::kOdd).name());
+  require_apart(moments, &HalfMoments::num_between, stack(Half::kEven).name(),
+                stack(Half::kOdd).name());
+  require_apart(moments, &HalfMoments::num_even_apart, stack(Half::kEven).name(), all.name());
+  require_apart(moments, &HalfMoments::num_odd_apart, stack(Half::kOdd).name(), all.name());
   const Slope found = slope_of(moments);
   require_alike(found.correlation, names, all.name());
   const bool is_ratio = are_counts(moments, found.slope);

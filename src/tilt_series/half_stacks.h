@@ -32,6 +32,8 @@ struct HalfMoments {
   double products = 0;                ///< Σ all · (even + odd)
   double num_not_finite = 0;          ///< of these pixels, those that are not finite in a half
   double even_squares = 0, odd_squares = 0;  ///< Σ even², Σ odd²: 0 if a section is constant
+  /// Numbers of pixels that differ between the halves, and between all frames and each half.
+  double num_between = 0, num_even_apart = 0, num_odd_apart = 0;
 };
 
 /// The even and the odd frames of a series, as two stacks with the sections of the stack of all

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/random.h"
+#include "expect_parts.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -109,6 +110,23 @@ TEST(HalfStacks, ValuesAroundZeroAreMatchedByTheirSlope) {
   EXPECT_LT(sum, 0);  // no counts
   EXPECT_NEAR(difference / static_cast<double>(all.size()), 0, 1e-3);
   expect_gain(stacks, Half::kOdd, 2);
+}
+
+TEST(HalfStacks, CopiesAreRefused) {
+  const auto refusal = [](const auto& change) {
+    Stacks changed(4, 4, 1);
+    change(changed);
+    return message_of<Error>([&] { changed.matched(); });
+  };
+  const auto copy = [](const std::filesystem::path& from, const std::filesystem::path& to) {
+    std::filesystem::copy_file(from, to, std::filesystem::copy_options::overwrite_existing);
+  };
+  testing::expect_parts(refusal([&](Stacks& s) { copy(s.halves.even, s.halves.odd); }),
+                        {"even.mrc", "odd.mrc", "are equal"});
+  testing::expect_parts(refusal([&](Stacks& s) { copy(s.scratch / "all.mrc", s.halves.even); }),
+                        {"even.mrc", "all.mrc", "are equal"});
+  testing::expect_parts(refusal([&](Stacks& s) { copy(s.scratch / "all.mrc", s.halves.odd); }),
+                        {"odd.mrc", "all.mrc", "are equal"});
 }
 
 TEST(HalfStacks, StacksThatAreNoHalvesAreRefused) {

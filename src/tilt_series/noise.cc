@@ -16,8 +16,16 @@ constexpr std::size_t kMinDifferences = 64;
 // part in a thousand.
 constexpr std::int64_t kEnoughDifferences = 1 << 20;
 
+/// Returns the standard deviation that rounding to steps of the smallest difference makes.
+double sigma_of_rounding(const std::vector<float>& differences) {
+  float step = std::numeric_limits<float>::infinity();
+  for (const float difference : differences)
+    if (difference != 0.0f) step = std::min(step, std::fabs(difference));
+  return std::isfinite(step) ? static_cast<double>(step) / std::sqrt(12.0) : 0.0;
+}
+
 /// Returns the estimate from mixed second differences at the image's own scale; 0 if there are too
-/// few.
+/// few. Where most of them are 0, as with few grey levels, rounding is what is known.
 double sigma_of_differences(const MaskedImage& image) {
   const std::int64_t row_step =
       std::max<std::int64_t>(1, image.width * image.height / kEnoughDifferences);
@@ -34,7 +42,8 @@ double sigma_of_differences(const MaskedImage& image) {
     }
   }
   if (differences.size() < kMinDifferences) return 0.0;
-  return base::robust_deviation_in_place(differences) / 2.0;
+  const double of_rounding = sigma_of_rounding(differences);
+  return std::max(base::robust_deviation_in_place(differences) / 2.0, of_rounding);
 }
 
 double standard_deviation(const MaskedImage& image) {

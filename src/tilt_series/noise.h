@@ -17,8 +17,9 @@ namespace tomofield::tilt_series {
 /// faster and faster, while correlated noise levels off. The second scale therefore
 /// counts only if it is 1.4 times the first and the step to four pixels is no larger.
 ///
-/// The result is always positive, and at least 1e-3 of the view's own standard deviation, since
-/// noise-free data would get infinite weight.
+/// Values of few grey levels hide smaller noise: the result is at least the error of rounding, the
+/// smallest of these differences over √12. It is always positive, and at least 1e-3 of the view's
+/// own standard deviation, since noise-free data would get infinite weight.
 double estimate_noise_sigma(const MaskedImage& view);
 
 }  // namespace tomofield::tilt_series

@@ -77,6 +77,13 @@ TEST(Noise, InterpolatedNoiseCountsAsTheWhiteNoiseThatItCameFrom) {
   EXPECT_LT(sigma, 2.1);
 }
 
+TEST(Noise, OfFewGreyLevelsIsAtLeastThatOfRounding) {
+  MaskedImage view = noisy_view(2.0, 4);
+  for (float& value : view.values) value = std::round(value / 60.0f);
+  EXPECT_GE(estimate_noise_sigma(view), 1 / std::sqrt(12.0));
+  EXPECT_LE(estimate_noise_sigma(view), 0.6);
+}
+
 TEST(Noise, NeverZero) {
   const MaskedImage clean = noisy_view(0.0, 1);
   EXPECT_GE(estimate_noise_sigma(clean), 1e-3 * 10.0);

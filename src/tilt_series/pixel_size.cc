@@ -124,6 +124,16 @@ void warn_of_titles(const TiltSeriesOptions& options, const io::ImageStack& stac
   }
 }
 
+// Warns of a stack that IMOD's newstack aligned, as its labels say, and that is aligned again.
+void warn_of_second_alignment(const TiltSeriesOptions& options, const io::ImageStack& stack) {
+  const auto& alignment = options.xf ? options.xf : options.aln;
+  if (!alignment || !io::is_in_labels(stack.header(), "transformed")) return;
+  base::log_warning(fmt::format(
+      "'{}' was transformed already, as its header says, and '{}' aligns it again: give the stack "
+      "as it was recorded, or leave {} out",
+      stack.name(), alignment->string(), options.xf ? "--xf" : "--aln"));
+}
+
 }  // namespace
 
 std::optional<io::MrcFacts> facts_of(const TiltSeriesOptions& options,
@@ -168,6 +178,7 @@ void warn_of_headers(const TiltSeriesOptions& options, const io::ImageStack& sta
   for (const std::string& difference : header.differences)
     base::log_warning(fmt::format("the header of '{}' states {}", stack.name(), difference));
   warn_of_titles(options, stack);
+  warn_of_second_alignment(options, stack);
   if (mdoc)
     for (const std::string& difference : mdoc->differences)
       base::log_warning(fmt::format("'{}' states {}", options.mdoc->string(), difference));

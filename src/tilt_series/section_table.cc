@@ -115,6 +115,11 @@ SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::Im
   if (!alignment.patches.empty()) table.patches.resize(table.of_section.size());
   for (std::size_t row = 0; row < alignment.patches.size(); ++row)
     table.patches[static_cast<std::size_t>(sections[row])] = alignment.patches[row];
+  if (alignment.beta_offset_deg != 0)
+    base::log_warning(
+        fmt::format("'{0}': BetaOffset, {1}°, is not applied, as in AreTomo's own volumes "
+                    "(--x-axis-tilt turns the specimen about X)",
+                    path.string(), alignment.beta_offset_deg));
   if (std::ranges::any_of(alignment.rows,
                           [](const io::AreTomoRow& row) { return row.magnification != 1.0; })) {
     base::log_warning(

@@ -87,6 +87,19 @@ TEST(SectionTable, SaysThatMagnificationsOfAreTomoAreNotApplied) {
   EXPECT_NE(warnings_with("1.00200").find("GMAG"), std::string::npos);
 }
 
+TEST(SectionTable, SaysThatBetaOffsetOfAreTomoIsNotApplied) {
+  const testing::ScratchDirectory folder;
+  const auto warnings_with = [&](const std::string& offset) {
+    const auto aln = folder.write("a.aln", "# RawSize = 64 48 2\n# BetaOffset = " + offset +
+                                               "\n1 0 1 0 0 0 0 0 0 -10\n2 0 1 0 0 0 0 0 0 10\n");
+    const testing::WarningCatcher warnings;
+    sections_of_aretomo(aln, SizedStack(64, 48, 2), true);
+    return warnings.text();
+  };
+  EXPECT_EQ(warnings_with("0.00"), "");
+  EXPECT_NE(warnings_with("3.50").find("BetaOffset, 3.5°, is not applied"), std::string::npos);
+}
+
 TEST(SectionTable, SaysThatAreTomoAlignedAStackOfOtherSections) {
   const testing::ScratchDirectory folder;
   const auto warnings_with = [&](int stated, const std::string& dark) {

@@ -317,6 +317,9 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
     if (table) warn_of_other_nominal_angles(*table);
     if (axis && mdoc) warn_of_two_axes(*axis, axis_of_header(stack));
     if (axis && alignment) warn_of_other_axis(*axis, alignment->axis_deg(), options, stack);
+    if (const auto by_rotation = mdoc ? axis_of_lone_rotation(options, *mdoc) : std::nullopt;
+        by_rotation && alignment && !options.tilt_axis_deg)
+      warn_of_other_line(*by_rotation, alignment->axis_deg(), options, stack);
     if (table && table->nominal_axis_deg && alignment && !options.xf)
       warn_of_other_axis({*table->nominal_axis_deg, "its _rlnTomoNominalTiltAxisAngle"},
                          alignment->axis_deg(), options, stack);

@@ -163,7 +163,8 @@ class Surveyor {
                              &HalfMoments::even, &HalfMoments::odd, &HalfMoments::all_squares,
                              &HalfMoments::sum_squares, &HalfMoments::products,
                              &HalfMoments::num_not_finite, &HalfMoments::even_squares,
-                             &HalfMoments::odd_squares);
+                             &HalfMoments::odd_squares, &HalfMoments::num_between,
+                             &HalfMoments::num_even_apart, &HalfMoments::num_odd_apart);
     processes_.run_collectively([&] {
       std::vector<std::int64_t> sections;
       for (const View& view : series_.views()) sections.push_back(view.section);

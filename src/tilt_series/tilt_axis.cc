@@ -18,6 +18,10 @@ namespace {
 constexpr double kVertical_deg = 1.0;
 constexpr std::string_view kIgnoredEntry = "TiltAxisAngle";
 
+bool ignores_axis(const TiltSeriesOptions& options) {
+  return option_table::has_name(option_table::split_names(options.ignore), kIgnoredEntry);
+}
+
 // Tells whether the labels say that a program has moved the pixels of the recorded images.
 bool is_transformed(const io::MrcHeader& header) {
   constexpr std::array<std::string_view, 4> kPrograms{"transformed", "blendmont", "mrctaper",
@@ -65,6 +69,15 @@ std::optional<StatedAxis> axis_of_mdoc(const std::filesystem::path& path, const 
 
 }  // namespace
 
+std::optional<StatedAxis> axis_of_lone_rotation(const TiltSeriesOptions& options,
+                                                const io::Mdoc& mdoc) {
+  if (!mdoc.lone_rotation_deg || ignores_axis(options)) return std::nullopt;
+  const io::AxisAngle& rotation = *mdoc.lone_rotation_deg;
+  return StatedAxis{std::remainder(rotation.value - 90.0, 360.0),
+                    fmt::format("by the rule of SerialEM, RotationAngle = {}° of {}",
+                                rotation.value, line_of(*options.mdoc, rotation))};
+}
+
 double angle_between_axes(double a_deg, double b_deg) {
   return std::fabs(std::remainder(a_deg - b_deg, 360.0));
 }
@@ -82,8 +95,7 @@ std::optional<StatedAxis> find_stated_axis(const TiltSeriesOptions& options,
                                            const io::ImageStack& stack,
                                            const std::optional<io::Mdoc>& mdoc, bool is_aligned) {
   if (options.tilt_axis_deg) return StatedAxis{*options.tilt_axis_deg, "--tilt-axis", true};
-  if (option_table::has_name(option_table::split_names(options.ignore), kIgnoredEntry))
-    return std::nullopt;
+  if (ignores_axis(options)) return std::nullopt;
   std::optional<StatedAxis> axis;
   if (mdoc) axis = axis_of_mdoc(*options.mdoc, *mdoc, is_aligned);
   if (!axis) {

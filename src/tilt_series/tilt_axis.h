@@ -26,6 +26,12 @@ std::optional<StatedAxis> find_stated_axis(const TiltSeriesOptions& options,
 /// are of volumes that are mirrored in z.
 double angle_between_axes(double a_deg, double b_deg);
 
+/// Returns the axis that a lone RotationAngle of an .mdoc belongs to by the rule of SerialEM, which
+/// does not tell it from its opposite. Returns nothing if the .mdoc states an axis, or no such
+/// angle, or if --ignore names TiltAxisAngle.
+std::optional<StatedAxis> axis_of_lone_rotation(const TiltSeriesOptions& options,
+                                                const io::Mdoc& mdoc);
+
 /// Throws Error for a stack that is taken for an aligned one although its axis is not vertical.
 void require_vertical(const StatedAxis& axis, const io::ImageStack& stack);
 

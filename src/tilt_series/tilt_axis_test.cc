@@ -162,6 +162,26 @@ TEST(TiltAxis, OfAnAlignmentThatDiffersIsSaid) {
   expect_parts(warning_with(5), {"a.xf", "85.0°", "a.mdoc", "5.0°"});
 }
 
+TEST(TiltAxis, OfALoneRotationThatAnAlignmentContradictsIsSaid) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  const auto warning_with = [&](double rotation_deg) {
+    options.mdoc = scratch.write(
+        "a.mdoc", fmt::format("[ZValue = 0]\nTiltAngle = -20\nRotationAngle = {}\n[ZValue = 1]\n"
+                              "TiltAngle = -10\n[ZValue = 2]\nTiltAngle = 0\n",
+                              rotation_deg));
+    const WarningCatcher warnings;
+    EXPECT_EQ(refusal(options), "");
+    return warnings.text();
+  };
+  options.xf = scratch.write("a.xf", "1 0 0 1 0 0\n1 0 0 1 0 0\n1 0 0 1 0 0\n");
+  for (const double rotation_deg : {90.0, -90.0, 92.0, -88.0})  // no rule tells the direction
+    EXPECT_EQ(warning_with(rotation_deg), "") << rotation_deg;
+  expect_parts(warning_with(175), {"a.xf", "0.0°", "a.mdoc", "rule of SerialEM", "85.0°"});
+  options.ignore = "TiltAxisAngle";
+  EXPECT_EQ(warning_with(175), "");
+}
+
 TEST(TiltAngles, OfTwoFilesThatDifferAreSaid) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = small_series(scratch);  // -20, -10, 0

@@ -16,6 +16,17 @@ double part_not_finite(const ViewCheck& found, std::int64_t num_pixels) {
   return static_cast<double>(found.num_not_finite) / static_cast<double>(num_pixels);
 }
 
+// Tells whether two measurements differ.
+bool has_contrast(const MaskedImage& image) {
+  const float* first = nullptr;
+  for (std::size_t i = 0; i < image.values.size(); ++i) {
+    if (!image.valid[i]) continue;
+    if (first != nullptr && image.values[i] != *first) return true;
+    if (first == nullptr) first = &image.values[i];
+  }
+  return false;
+}
+
 }  // namespace
 
 bool has_measurements(const MaskedImage& image) {
@@ -23,7 +34,7 @@ bool has_measurements(const MaskedImage& image) {
 }
 
 ViewCheck check_view(const PixelCensus& census, const MaskedImage& image) {
-  return {census.num_not_finite, census.num_bad, census.is_constant, has_measurements(image)};
+  return {census.num_not_finite, census.num_bad, census.is_constant, has_contrast(image)};
 }
 
 void require_plausible_scale(std::span<const ViewCheck> found, const std::string& stack,
@@ -64,8 +75,9 @@ void require_usable(const ViewCheck& found, const std::string& name, std::int64_
   }
   if (!found.has_measurements) {
     throw Error(
-        fmt::format("{} has no pixel left: its alignment moves it out of the view, it is all "
-                    "flat fill, or --mask is zero all over it; leave it out with --exclude {}",
+        fmt::format("{} has no pixel left, or equal ones alone: its alignment moves it out of the "
+                    "view, it is flat fill, or --mask is zero all over it; leave it out with "
+                    "--exclude {}",
                     name, section));
   }
   if (found.num_not_finite > 0) {

@@ -14,7 +14,7 @@ struct ViewCheck {
   std::int64_t num_not_finite = 0;
   std::int64_t num_bad = 0;
   std::int64_t is_constant = 0;
-  std::int64_t has_measurements = 0;
+  std::int64_t has_measurements = 0;  ///< that differ from each other
 };
 
 /// Returns true if any pixel is a measurement.

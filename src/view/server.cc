@@ -35,6 +35,7 @@ struct Server::Impl {
       : volumes(std::move(shown)), http(port) {}
 
   std::string own_host() const { return fmt::format("127.0.0.1:{}", http.port()); }
+  bool is_own(const std::string& host) const;
   Answer answer(const Request& request) const;
   Answer plane(const Request& request) const;
 
@@ -43,8 +44,17 @@ struct Server::Impl {
   HttpServer http;
 };
 
+// Tells whether a request names this server. Browsers leave the usual port of HTTP out.
+bool Server::Impl::is_own(const std::string& host) const {
+  constexpr int kUsualPort = 80;
+  const std::string port = http.port() == kUsualPort && host.find(':') == std::string::npos
+                               ? ""
+                               : fmt::format(":{}", http.port());
+  return host == "127.0.0.1" + port || host == "localhost" + port;
+}
+
 Answer Server::Impl::answer(const Request& request) const {
-  if (request.host != own_host() && request.host != fmt::format("localhost:{}", http.port()))
+  if (!is_own(request.host))
     return refusal(403, "this server is for the browsers of its own machine");
   if (request.method != "GET") {
     Response response = refusal(405, "only GET is answered");

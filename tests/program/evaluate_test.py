@@ -169,6 +169,13 @@ def test_a_turned_box_has_no_place():
     said = run(box, other)
     assert said.returncode == 0 and "turned before it was sampled" in said.stderr, said
     assert "placed by their ORIGINs" not in said.stderr
+    # It is no projection of the views, and has no leaves where those of the model are.
+    turned = path("turned_whole.mrc")
+    harness.succeed("export", model[:-4] + ".h5", "-o", turned, "--level", "10,0")
+    said = run(turned, *series, "--no-margin")
+    assert said.returncode == 2 and "was turned before it was sampled" in said.stderr, said
+    said = run(turned, "--model", model[:-4] + ".h5")
+    assert said.returncode == 2 and "was turned, or is another part" in said.stderr, said
 
 
 def test_values_that_their_mode_cannot_hold_are_warned_of():
@@ -239,9 +246,31 @@ def test_origins_say_where_a_part_lies():
     save("particle_ball.mrc", np.ones((4, 4, 4)))
     result = run(right, "--particles", path("particles.star"))
     assert result.returncode == 2 and "a part of a volume" in result.stderr, result
+    # ORIGINs of other programs do not place volumes of one size, which is said.
+    _, result = evaluate(save("left.mrc", reconstruction), save("right.mrc", truth, origin=(80, 0, 0)))
+    assert "begins 8, 0, 0 voxels after" in result.stderr, result
     # A nonsensical ORIGIN is ignored.
     found, _ = evaluate(save("corner.mrc", corner, origin=(3, 4, 1e30)), whole)
     assert found["box_first"] == [0, 10, 0], found
+
+
+def test_particles_of_other_programs_are_no_positions_of_simulate():
+    """What would move or select them is refused."""
+    volume = save("plain.mrc", np.random.default_rng(1).random((24, 24, 24)))
+    save("particle_ball.mrc", np.ones((4, 4, 4)))
+
+    def refusal(column, values):
+        with open(path("others.star"), "w", encoding="utf-8") as file:
+            file.write("data_particles\nloop_\n_rlnCoordinateX\n_rlnCoordinateY\n_rlnCoordinateZ\n"
+                       "_tomofieldParticleKind\n" + column + "\n"
+                       + "".join(f"12 12 {12 + i} ball {value}\n" for i, value in enumerate(values)))
+        result = run(volume, "--particles", path("others.star"))
+        return result.stderr if result.returncode == 2 else result.returncode
+
+    assert refusal("_rlnOriginXAngst", [0, 0]) == 0
+    assert "_rlnOriginXAngst" in refusal("_rlnOriginXAngst", [0, 200])
+    assert refusal("_rlnTomoName", ["TS_1", "TS_1"]) == 0
+    assert "several tomograms" in refusal("_rlnTomoName", ["TS_1", "TS_2"])
 
 
 def test_hopeless_pairs_are_refused():
@@ -577,6 +606,10 @@ def test_reprojection_error():
                      label="tomofield 1", origin=(80, 0, 0))
     refused = run(elsewhere, *series, "--no-margin")
     assert refused.returncode == 2 and "--roi that it was made with" in refused.stderr, refused
+    above = save("above.mrc", volume, float(mrcfile.open(truth, header_only=True).voxel_size.x),
+                 label="tomofield 1", origin=(0, 0, 80))
+    refused = run(above, *series, "--no-margin")
+    assert refused.returncode == 2 and "whole thickness" in refused.stderr, refused
     # Units and contrast do not matter. The hand does, and so does a volume that lacks something.
     other, _ = evaluate(save("units.mrc", -30 * volume), *series, "--no-margin")
     np.testing.assert_allclose(other["reprojection"]["error"], found["error"], rtol=1e-3)

@@ -702,6 +702,37 @@ def test_a_stack_that_was_weighted_by_the_dose_is_named():
            "weighted by the dose already", "--dose-weighted")
 
 
+def test_a_stack_that_was_divided_by_the_transfer_of_the_detector_is_named():
+    folder = write_series("divided")
+    write_titles(os.path.join(folder, "TS_01.mrc"), ["MTFFILTER: Filtered by inverse of MTF"])
+    with open(os.path.join(folder, "camera.star"), "w", encoding="utf-8") as file:
+        file.write("data_mtf\nloop_\n_rlnResolutionInversePixel #1\n_rlnMtfValue #2\n0 1\n0.5 0.2\n")
+    expect(dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--mtf", "camera.star"),
+           "mtffilter", "divides by it again")
+    assert "mtffilter" not in dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt")
+
+
+def test_the_flag_of_imod_for_a_corrected_stack_counts_without_a_title():
+    folder = write_series("flag")
+    for flags, is_said in ((4 | 32, True), (4, False)):
+        with open(os.path.join(folder, "TS_01.mrc"), "r+b") as file:
+            file.seek(152)
+            file.write(np.array([1146047817, flags], "<i4").tobytes())
+        said = dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--defocus", 3)
+        assert ("ctfphaseflip" in said) == is_said, said
+
+
+def test_a_stack_that_newstack_aligned_is_not_aligned_again_in_silence():
+    folder = write_series("twice")
+    with open(os.path.join(folder, "TS_01.xf"), "w", encoding="utf-8") as file:
+        file.write("1 0 0 1 0 0\n" * len(open(os.path.join(folder, "TS_01.rawtlt"), encoding="utf-8").readlines()))
+    options = ["TS_01.mrc", "--tlt", "TS_01.rawtlt", "--xf", "TS_01.xf"]
+    assert "aligns it again" not in dry(folder, *options)
+    write_titles(os.path.join(folder, "TS_01.mrc"), ["NEWSTACK: Images copied, transformed"])
+    expect(dry(folder, *options), "aligns it again", "TS_01.xf")
+    assert "aligns it again" not in dry(folder, *options[:3])
+
+
 @pytest.mark.parametrize("kind, low, high, said", [
     ("<i2", 0, 60000, "with sign (mode 1)"), ("<u2", -3000, 9000, "without a sign (mode 6)"),
     ("<i2", -3000, 9000, None), ("<u2", 0, 60000, None)])

@@ -155,6 +155,16 @@ def test_angles_of_subtomograms_that_are_not_stated_are_0(folder):
     assert np.abs(turned - cut_with({})).max() > 0.01 * turned.std()
 
 
+def test_particles_in_two_tables_are_refused(folder):
+    path = write_particles(folder)
+    with open(path, encoding="utf-8") as file:
+        text = file.read()
+    with open(path, "a", encoding="utf-8") as file:
+        file.write(text[text.index("data_particles"):].replace("data_particles", "data_more"))
+    ended = cut_out(folder, "--particles", path, "--box", 12, run=harness.tomofield)
+    assert ended.returncode == 2 and "several tables" in ended.stderr, ended
+
+
 def test_points_of_imod_are_voxels_of_the_volume(folder):
     # The middle of the first voxel is at (0.5, 0.5, 0) in a model of IMOD.
     points = os.path.join(folder, "points.txt")

@@ -178,6 +178,8 @@ SENTENCES = (
     ("a side of 1e\\+300 Å", lambda m: tomofield.correlate_shells(VIEWS, VIEWS, 1e300)),
     ("the threshold is a correlation from -1 to 1, not nan", lambda m: curve().resolution_A(np.nan)),
     ("no path holds a null character", lambda m: tomofield.read_mrc("a\0b")),
+    ("no path holds such a character", lambda m: tomofield.Model("\ud800")),
+    ("no path holds such a character", lambda m: tomofield.read_record("a\ud800b")),
 )
 
 

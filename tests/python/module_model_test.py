@@ -1,6 +1,10 @@
 """tomofield.Model gives points, boxes and tilted planes, as `tomofield export` does."""
 
 import _thread
+import os
+import pathlib
+import subprocess
+import sys
 import threading
 import time
 
@@ -125,3 +129,36 @@ def test_threads_export_at_the_same_time(model, tmp_path):
         thread.join()
     assert not failures, failures
     assert sorted(path.name for path in tmp_path.glob("*.mrc")) == [f"{i}.mrc" for i in range(4)]
+
+
+def test_the_number_of_threads_stays_while_a_thread_computes(series):
+    """Each thread of the work has a buffer of its own, so no other number may come between."""
+    script = f"""
+import threading, tomofield
+model = tomofield.Model({str(series.folder / "tomogram.h5")!r})
+refused, done = [], []
+def work():
+    for _ in range(30):
+        model.sample(model.region())
+    done.append(True)
+threads = [threading.Thread(target=work) for _ in range(2)]
+for thread in threads: thread.start()
+count = 0
+while any(thread.is_alive() for thread in threads):
+    count += 1
+    try: tomofield.set_thread_count(1 + count % 3)
+    except tomofield.Error as error: refused.append(str(error))
+for thread in threads: thread.join()
+tomofield.set_thread_count(2)
+assert len(done) == 2 and refused and "set it before or after" in refused[0], (done, refused)
+
+def told(progress):
+    tomofield.set_thread_count(1)
+try:
+    tomofield.reconstruct({str(series.folder / "s.mrc")!r}, tlt={str(series.folder / "s.tlt")!r}, thickness=16,
+                          contrast="bright", with_margin=False, epochs=1, progress=told)
+except tomofield.Error as error: print(error)
+"""
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=300,
+                           env={**os.environ, "PYTHONPATH": str(pathlib.Path(tomofield.__file__).parents[1])})
+    assert ended.returncode == 0 and "set it before or after" in ended.stdout, ended

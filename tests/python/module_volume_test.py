@@ -364,3 +364,35 @@ def test_voxel_sizes_come_from_tomograms_or_are_asked_for(made, series):
 def test_a_tomogram_is_a_volume_with_a_size(values, size, said):
     with pytest.raises(tomofield.Error, match=said):
         tomofield.Tomogram(values, size)
+
+
+def test_a_mask_that_is_set_later_is_seen():
+    tomogram = tomofield.Tomogram(np.ma.array(np.ones((4, 8, 8), np.float32)), 10)
+    tomogram.values[2] = np.ma.masked
+    with pytest.raises(tomofield.Error, match="no masked voxels"):
+        tomogram.section("z", 2)
+    assert tomogram.section("z", 1).dtype == np.float32
+
+
+def test_numbers_that_floats_lose_are_refused_beside_nan(tmp_path):
+    large = np.random.default_rng(0).normal(3e7, 1, (8, 16, 16))
+    small = np.random.default_rng(0).normal(0, 1e-50, (8, 16, 16))
+    for values, reason in ((large, "lost in the 32-bit floats"), (small, "do not hold")):
+        values[:, 0, 0] = np.nan
+        with np.errstate(all="raise"):
+            with pytest.raises(tomofield.Error, match=reason):
+                tomofield.write_mrc(tmp_path / "a.mrc", values, 10)
+    small[3] = np.random.default_rng(1).normal(0, 1, (16, 16))  # the others are zeros beside it
+    tomofield.write_mrc(tmp_path / "a.mrc", small, 10)
+
+
+def test_an_array_that_cannot_be_read_has_its_reason():
+    class Damaged:
+        def __array__(self, dtype=None):
+            raise OSError("filter returned failure")
+
+    damaged = Damaged()
+    for call in (lambda: tomofield.Tomogram(damaged, 10),
+                 lambda: tomofield.score_volume(damaged, np.ones((8, 16, 16)))):
+        with pytest.raises(tomofield.Error, match="type Damaged cannot be read.*filter returned"):
+            call()

@@ -168,6 +168,90 @@ TEST(ViewTransfers, OpticsThatContradictOrCannotBeAreWarnedOf) {
   expect_parts(warnings(options), {"a.defocus", "right unit", "5 of its sections"});
 }
 
+// Returns a table of RELION's or Gctf's form without tilts; `images` are the images of its rows.
+std::string table_of(const std::vector<std::string>& images) {
+  std::string text =
+      "data_\nloop_\n_rlnMicrographName #1\n_rlnDefocusU #2\n_rlnDefocusV #3\n"
+      "_rlnDefocusAngle #4\n_rlnMicrographPreExposure #5\n";
+  for (std::size_t i = 0; i < images.size(); ++i)
+    text += fmt::format("{0} {1}0000 {1}0000 0 {2}\n", images[i], 1 + i, 3 * i);
+  return text;
+}
+
+TEST(ViewTransfers, RowsAreThoseOfTheImagesThatTheyName) {
+  const ScratchDirectory folder;
+  simulate::SimulationOptions simulated = simulation();
+  simulated.imaging.dose_per_tilt = 0;
+  simulate::simulate_series(folder / "s", simulated, false);
+  SeriesFiles files = files_in(folder);
+  std::string said;
+  const auto defoci_um = [&](const std::string& table) {
+    files.ctf = folder.write("a.star", table);
+    const testing::WarningCatcher caught;
+    std::vector<double> found;
+    for (const ViewTransfer& transfer : transfers_of(files, options_of_run()))
+      found.push_back(transfer.defocus.u_A / 1e4);
+    said = caught.text();
+    return found;
+  };
+  const std::vector<double> in_order{1, 2, 3, 4, 5}, reversed{5, 4, 3, 2, 1};
+  const auto names = [](const std::string& stack, const std::vector<int>& numbers) {
+    std::vector<std::string> all;
+    for (const int number : numbers) all.push_back(fmt::format("{:06d}@{}", number, stack));
+    return all;
+  };
+  EXPECT_EQ(defoci_um(table_of(names("a/tilt_series.st", {1, 2, 3, 4, 5}))), in_order);
+  EXPECT_EQ(defoci_um(table_of(names("tilt_series.mrc", {5, 4, 3, 2, 1}))), reversed);
+  EXPECT_EQ(said, "");
+  EXPECT_EQ(defoci_um(table_of(names("TS_07.mrc", {5, 4, 3, 2, 1}))), reversed);
+  expect_parts(said, {"a.star", "other images", "TS_07.mrc", "by the numbers"});
+  EXPECT_EQ(defoci_um(table_of({"a.mrc", "b.mrc", "c.mrc", "d.mrc", "e.mrc"})), in_order);
+  expect_parts(said, {"a.star", "other images", "a.mrc", "in their order"});
+}
+
+TEST(ViewTransfers, DosesOfATableForTheContrastTransferCount) {
+  const ScratchDirectory folder;
+  simulate::simulate_series(folder / "s", simulation(), false);
+  SeriesFiles files = files_in(folder);
+  std::vector<std::string> images;
+  for (const int number : {3, 2, 4, 1, 5}) images.push_back(fmt::format("{}@tilt_series", number));
+  files.ctf = folder.write("a.star", table_of(images));
+  const auto exposures = [&](const Options& options) {
+    std::vector<double> found;
+    for (const ViewTransfer& transfer : transfers_of(files, options))
+      found.push_back(transfer.exposure);
+    return found;
+  };
+  Options options = options_of_run();
+  EXPECT_EQ(exposures(options), (std::vector<double>{10.5, 4.5, 1.5, 7.5, 13.5}));
+  options.views.dose_per_tilt = 2.0;  // in the order of the table
+  EXPECT_EQ(exposures(options), (std::vector<double>{7, 3, 1, 5, 9}));
+  options.views.dose_per_tilt = 0.0;
+  EXPECT_EQ(exposures(options), (std::vector<double>{0, 0, 0, 0, 0}));
+}
+
+TEST(ViewTransfers, TheHandOfATableForTheContrastTransferCounts) {
+  const ScratchDirectory folder;
+  simulate::simulate_series(folder / "s", simulation(), false);
+  SeriesFiles files = files_in(folder);
+  const auto slope = [&](const char* inverted, const Options& options) {
+    files.ctf = folder.write(
+        "a.xml", fmt::format("<TiltSeries AreAnglesInverted=\"{}\"><Angles>40\n20\n0\n-20\n-40"
+                             "</Angles><MoviePath>a\nb\nc\nd\ne</MoviePath><GridCTF Width=\"1\" "
+                             "Height=\"1\" Depth=\"1\"><Node X=\"0\" Y=\"0\" Z=\"0\" "
+                             "Value=\"3\"/></GridCTF></TiltSeries>",
+                             inverted));
+    return transfers_of(files, options)[0].slope.x_A;
+  };
+  Options options = options_of_run();
+  EXPECT_EQ(slope("True", options), -slope("False", options));
+  EXPECT_NE(slope("True", options), 0.0);
+  const double of_true = slope("True", options);
+  options.views.defocus_hand = 1;
+  EXPECT_EQ(slope("True", options), of_true);
+  EXPECT_EQ(slope("False", options), of_true);
+}
+
 TEST(ViewTransfers, ContradictionsAreFaults) {
   const auto num_faults = [](const Options& options, const char* ctf) {
     SeriesFiles files;

@@ -16,6 +16,7 @@
 #include "base/threads/stoppable_loops.h"
 #include "base/threads/worker_threads.h"
 #include "base/trace.h"
+#include "tomofield/error.h"
 
 namespace tomofield::base {
 namespace {
@@ -127,6 +128,10 @@ OwnThreads& current_threads() {
   return threads;
 }
 
+// The users of the threads, and what guards them and the asked number.
+std::mutex g_use_mutex;
+int g_num_users = 0;
+
 Threads& threads() {
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
@@ -141,8 +146,23 @@ Threads& threads() {
 int thread_count() { return threads().workers().count(); }
 
 void set_thread_count(int count) {
+  const std::lock_guard lock(g_use_mutex);
+  if (g_num_users > 0)
+    throw Error(
+        "the number of threads stays while a call of tomofield works, in another thread or in "
+        "that of a callback: set it before or after");
   g_asked_count = std::max(count, 0);
   current_threads().reset();
+}
+
+ThreadsInUse::ThreadsInUse() {
+  const std::lock_guard lock(g_use_mutex);
+  ++g_num_users;
+}
+
+ThreadsInUse::~ThreadsInUse() {
+  const std::lock_guard lock(g_use_mutex);
+  --g_num_users;
 }
 
 void share_machine_with(int processes) {

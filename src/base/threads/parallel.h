@@ -13,8 +13,20 @@ inline constexpr int kMostThreads = 1024;
 /// Returns the number of threads that parallel_for uses. By default it is OMP_NUM_THREADS, or else
 /// the processors that this process may use (processors.h).
 int thread_count();
-/// Sets the number of threads; 0 is the default. No loop may run.
+/// Sets the number of threads; 0 is the default. Throws Error while a ThreadsInUse lives. No loop
+/// may run.
 void set_thread_count(int count);
+
+/// Keeps the number of threads as it is while it lives: work makes a buffer for each of them before
+/// its loops. Every public function of the library that computes has one. Thread-safe.
+class ThreadsInUse {
+ public:
+  ThreadsInUse();
+  ~ThreadsInUse();
+  ThreadsInUse(const ThreadsInUse&) = delete;
+  ThreadsInUse& operator=(const ThreadsInUse&) = delete;
+};
+
 /// Makes the default number of threads a share of the processors, for `processes` of one job on
 /// this machine. Processes that are bound to different processors do not share.
 void share_machine_with(int processes);

@@ -271,6 +271,18 @@ TEST(ParallelLoops, APageLiesOnTheNodeOfTheThreadThatWritesItFirst) {
     EXPECT_EQ(node_of(&buffer[i * kBytes]), static_cast<int>(node[i])) << i;
 }
 
+TEST(Parallel, TheNumberOfThreadsStaysWhileTheyAreUsed) {
+  set_thread_count(2);
+  {
+    const ThreadsInUse used, also;
+    EXPECT_THROW(set_thread_count(3), Error);
+    EXPECT_EQ(thread_count(), 2);
+  }
+  set_thread_count(3);
+  EXPECT_EQ(thread_count(), 3);
+  set_thread_count(0);
+}
+
 TEST(Parallel, LoopsOfAThreadStopWhereTheyMay) {
   std::atomic<int> calls = 0;
   const auto run = [&] { parallel_for("count", 1000, [&](std::int64_t) { ++calls; }); };

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 #include "base/utf8.h"
@@ -13,6 +15,7 @@
 #include "evaluate/volume_pair.h"
 #include "io/images/mrc_format.h"
 #include "io/tables/star_file.h"
+#include "io/tables/unknown_entries.h"
 #include "tomofield/error.h"
 
 namespace tomofield::evaluate {
@@ -94,10 +97,37 @@ std::vector<Detection> judge(const std::vector<Pick>& picks, const std::vector<P
   return detections;
 }
 
+// Throws Error for what lists of other programs have beside the positions that simulate writes.
+void require_plain(const std::filesystem::path& list, const io::StarTable& table) {
+  constexpr std::array<std::string_view, 10> kPlain{"rlnCoordinateX",
+                                                    "rlnCoordinateY",
+                                                    "rlnCoordinateZ",
+                                                    "rlnAngleRot",
+                                                    "rlnAngleTilt",
+                                                    "rlnAnglePsi",
+                                                    kKind,
+                                                    "rlnTomoName",
+                                                    "rlnClassNumber",
+                                                    "rlnGroupNumber"};
+  const auto others = io::unknown_columns(table, kPlain);
+  if (!others.empty())
+    throw Error(fmt::format(
+        "'{}' has the column {}, and scores take the positions and kinds that simulate writes "
+        "alone: apply it, and leave it out",
+        list.string(), others.front()));
+  for (std::size_t row = 1; row < table.num_rows(); ++row)
+    if (table.find(row, "rlnTomoName") != table.find(0, "rlnTomoName"))
+      throw Error(
+          fmt::format("'{}' has particles of several tomograms (_rlnTomoName), and scores "
+                      "are of one volume: leave those of one",
+                      list.string()));
+}
+
 // Returns the table of the particles in a list.
 io::StarTable read_table(const std::filesystem::path& list) {
   const std::vector<io::StarTable> tables = io::read_star_file(list);
-  if (const io::StarTable* table = io::find_table(tables, kKind)) return *table;
+  for (const io::StarTable& table : tables) require_plain(list, table);
+  if (const io::StarTable* table = io::find_only_table(list, tables, kKind)) return *table;
   throw Error(fmt::format("'{}' has no column _{}: give the particles.star of simulate",
                           list.string(), kKind));
 }

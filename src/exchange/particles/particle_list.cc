@@ -134,7 +134,7 @@ Particle relion_particle(const io::StarRow& row, const Point& centre, double pix
 ParticleList read_relion(const fs::path& path, const fs::path& model_file,
                          const output::ModelInfo& model, const std::string& tomogram) {
   const std::vector<io::StarTable> tables = io::read_star_file(path);
-  const io::StarTable* const all = io::find_table(tables, kCoordinates[0]);
+  const io::StarTable* const all = io::find_only_table(path, tables, kCoordinates[0]);
   if (all == nullptr) {
     throw Error(fmt::format("'{}' has no column _{}, which the particles of RELION 5 have{}",
                             path.string(), kCoordinates[0],

@@ -40,6 +40,11 @@ class FilesStack : public ImageStack {
   const MrcHeader& header() const override { return header_; }
   std::string name() const override { return name_; }
 
+  std::string image_name(std::int64_t section) const override {
+    const Section& found = sections_.at(static_cast<std::size_t>(section));
+    return found.stack->image_name(found.index);
+  }
+
   void read_section(std::int64_t section, std::span<float> out) const override {
     const Section& found = sections_.at(static_cast<std::size_t>(section));
     found.stack->read_section(found.index, out);
@@ -116,6 +121,7 @@ class FilesStack : public ImageStack {
     };
     note("a tilt axis in degrees", axis(found), axis(header_));
     note("a voltage in kV", found.extended_voltage_kV, header_.extended_voltage_kV);
+    header_.is_ctf_corrected |= is_phase_flipped(found);
     if (!axis(header_)) header_.extended_axis_deg = axis(found);
     if (!header_.extended_voltage_kV) header_.extended_voltage_kV = found.extended_voltage_kV;
     if (!header_.extended_pixel_A) header_.extended_pixel_A = found.extended_pixel_A;

@@ -72,6 +72,10 @@ void refuse_other_file(const std::filesystem::path& path, std::string_view exten
 
 }  // namespace
 
+std::string ImageStack::image_name(std::int64_t section) const {
+  return header().nz == 1 ? name() : fmt::format("{:06d}@{}", section + 1, name());
+}
+
 std::shared_ptr<const ImageStack> open_image_stack(const std::filesystem::path& path) {
   const std::string extension = path.extension().string();
   if (extension == ".mdoc") return open_mdoc_images(path, path.parent_path());

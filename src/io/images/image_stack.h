@@ -24,6 +24,9 @@ class ImageStack {
   virtual std::string name() const = 0;
   /// Tells whether the images are in memory, which a user of the library gave, and not in a file.
   virtual bool is_in_memory() const { return false; }
+  /// Returns what RELION calls the image of a section: "000002@stack.mrc", or "a.mrc" for the only
+  /// image of a file.
+  virtual std::string image_name(std::int64_t section) const;
   /// Copies section `section` into `out`, ny × nx floats.
   virtual void read_section(std::int64_t section, std::span<float> out) const = 0;
 };

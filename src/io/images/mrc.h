@@ -49,7 +49,8 @@ struct MrcHeader {
   /// Says for messages what the header states twice and differently, or that cannot be: "pixels in
   /// Å of 7 in section 2, and of 3.5 in the first, which is taken".
   std::vector<std::string> differences;
-  bool has_pieces = false;  ///< by the extended header: sections are the pieces of montages
+  bool is_ctf_corrected = false;  ///< IMOD's flag of a stack that went through ctfphaseflip
+  bool has_pieces = false;        ///< by the extended header: sections are the pieces of montages
   std::vector<std::string> labels;
 };
 

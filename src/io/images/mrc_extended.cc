@@ -66,6 +66,15 @@ void take_tilts(std::vector<double> tilts_deg, MrcHeader& header) {
   if (are_angles && (differ || header.nz == 1)) header.extended_tilt_deg = std::move(tilts_deg);
 }
 
+// Notes that records after those of the sections state tilts, too: it cannot be told whose they
+// are.
+void refuse_surplus(MrcHeader& header) {
+  header.extended_tilt_deg.clear();
+  header.differences.push_back(fmt::format(
+      "tilts of more sections than its {}, which are not taken: give the right ones (--tlt)",
+      header.nz));
+}
+
 void take_pixel_size(double width_A, double height_A, MrcHeader& header) {
   if (!base::is_plausible_pixel_size(width_A)) return;
   header.extended_pixel_A = width_A;
@@ -118,6 +127,16 @@ bool has_pieces(std::span<const std::byte> extended, const ExtendedRecords& reco
   return false;
 }
 
+// Tells whether a record after those of the sections has a tilt. Unused ones have zeros.
+template <typename TiltOf>
+bool has_surplus(std::span<const std::byte> extended, const ExtendedRecords& records,
+                 const MrcHeader& header, const TiltOf& tilt_of) {
+  const std::int64_t count = std::ssize(extended) / records.bytes_per_section;
+  for (std::int64_t section = header.nz; section < count; ++section)
+    if (tilt_of(section) != 0.0) return true;
+  return false;
+}
+
 void read_serialem(std::span<const std::byte> extended, const ExtendedRecords& records,
                    MrcHeader& header) {
   const auto number = [&](SerialEmFlag flag, std::int64_t section) {
@@ -136,6 +155,9 @@ void read_serialem(std::span<const std::byte> extended, const ExtendedRecords& r
   for (std::int64_t section = 0; section < header.nz; ++section)
     tilts_deg.push_back(number(kTilt, section) / 100.0);
   header.extended_tilt_deg = std::move(tilts_deg);
+  if (has_surplus(extended, records, header,
+                  [&](std::int64_t section) { return number(kTilt, section); }))
+    refuse_surplus(header);
 }
 
 void read_floats(std::span<const std::byte> extended, const ExtendedRecords& records,
@@ -150,6 +172,9 @@ void read_floats(std::span<const std::byte> extended, const ExtendedRecords& rec
   for (std::int64_t section = 0; section < header.nz; ++section)
     tilts_deg.push_back(value(section, 0));
   take_tilts(std::move(tilts_deg), header);
+  if (has_surplus(extended, records, header,
+                  [&](std::int64_t section) { return value(section, 0); }))
+    refuse_surplus(header);
   if (records.num_floats <= kPixel) return;
   const auto axis_deg = [&](std::int64_t section) {
     return records.is_fei ? -value(section, kAxis) : value(section, kAxis);
@@ -220,13 +245,18 @@ class FeiRecord {
 void read_fei(std::span<const std::byte> extended, MrcHeader& header) {
   std::vector<double> tilts_deg;
   std::vector<FeiRecord> records;
-  for (std::size_t at = 0; std::ssize(records) < header.nz;) {
-    if (at + FeiRecord::kSmallest > extended.size()) break;
+  bool has_surplus = false;
+  for (std::size_t at = 0; at + FeiRecord::kSmallest <= extended.size() && !has_surplus;) {
     const FeiRecord record(extended.subspan(at), header.is_byte_swapped);
     if (record.size() < FeiRecord::kSmallest) break;
-    if (const auto tilt_deg = record.tilt_deg()) tilts_deg.push_back(*tilt_deg);
-    records.push_back(record);
     at += static_cast<std::size_t>(record.size());
+    const auto tilt_deg = record.tilt_deg();
+    if (std::ssize(records) == header.nz) {
+      has_surplus = tilt_deg.value_or(0.0) != 0.0;
+      continue;
+    }
+    if (tilt_deg) tilts_deg.push_back(*tilt_deg);
+    records.push_back(record);
   }
   if (records.empty()) return;
   if (std::ssize(records) < header.nz)
@@ -236,6 +266,7 @@ void read_fei(std::span<const std::byte> extended, MrcHeader& header) {
                     records.size(), header.nz));
   else if (std::ssize(tilts_deg) == header.nz)
     take_tilts(std::move(tilts_deg), header);
+  if (has_surplus) refuse_surplus(header);
   const FeiRecord& first = records.front();
   if (const auto width_A = first.pixel_width_A())
     take_pixel_size(*width_A, first.pixel_height_A().value_or(*width_A), header);

@@ -135,6 +135,37 @@ TEST(Mrc, FloatRecordsOfExtendedHeaders) {
       header_with_extended(std::string(144, '\0'), no_type, 0, 12).extended_tilt_deg.empty());
 }
 
+TEST(Mrc, TiltsOfMoreSectionsAreNotTaken) {
+  const auto expect_surplus = [](const MrcHeader& header) {
+    EXPECT_TRUE(header.extended_tilt_deg.empty());
+    ASSERT_FALSE(header.differences.empty());
+    testing::expect_parts(header.differences[0], {"more sections than its 3", "--tlt"});
+  };
+  const auto of_serialem = [](std::int16_t after) {
+    const std::vector<std::int16_t> records{-6000, 0, 4550, after, 0};
+    return header_with_extended(std::string(reinterpret_cast<const char*>(records.data()), 10),
+                                "SERI", 2, 1);
+  };
+  EXPECT_EQ(of_serialem(0).extended_tilt_deg.size(), 3u);  // empty records
+  expect_surplus(of_serialem(6000));
+  const std::string floats = float_records(0, 32, -86.25f, 3.5e-10f);
+  EXPECT_EQ(
+      header_with_extended(floats + std::string(256, '\0'), "AGAR", 0, 32).extended_tilt_deg.size(),
+      3u);
+  expect_surplus(header_with_extended(floats + floats, "AGAR", 0, 32));
+  std::string fei;
+  for (const double tilt : {-60.0, 0.0, 45.5, 60.0}) {
+    std::string record(768, '\0');
+    put(record, 0, std::int32_t{768});
+    put(record, 8, 1u << 7);
+    put(record, 100, tilt);
+    fei += record;
+  }
+  expect_surplus(header_with_extended(fei, "FEI1", 0, 0));
+  put(fei, 3 * 768 + 100, 0.0);
+  EXPECT_EQ(header_with_extended(fei, "FEI1", 0, 0).extended_tilt_deg.size(), 3u);
+}
+
 TEST(Mrc, PiecesOfMontagesByTheHeaderOfSerialEm) {
   const auto records = [](char z_of_second) {
     std::string extended(24, '\0');

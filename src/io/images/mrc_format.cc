@@ -55,6 +55,7 @@ constexpr std::int32_t kImodStampValue = 1146047817;
 // Space groups of MRC2014: 0 of images, 1 of a volume, 401 of a stack of volumes, whose MZ counts
 // the sections of one.
 constexpr std::int32_t kSpaceGroupOfVolume = 1, kSpaceGroupOfVolumes = 401;
+constexpr std::int32_t kImodCtfCorrected = 32;
 constexpr std::int32_t kImodSignedBytes = 1;
 constexpr std::int32_t kImodPacked = 16;         // two values of 4 bits in a byte
 constexpr std::int32_t kImodOriginInverted = 4;  // ORIGIN has the sign of MRC2014
@@ -232,6 +233,8 @@ MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name
   if (fields.int32(kSpaceGroup) == kSpaceGroupOfVolumes)
     header.sections_a_volume = std::clamp<std::int64_t>(fields.int32(kSampling + 8), 1, header.nz);
   header.bytes_are_unsigned = has_unsigned_bytes(fields, header);
+  header.is_ctf_corrected = fields.int32(kImodStamp) == kImodStampValue &&
+                            (fields.int32(kImodFlags) & kImodCtfCorrected) != 0;
   header.extended_header_bytes = fields.int32(kExtendedBytes);
   if (header.extended_header_bytes < 0) {
     throw Error(
@@ -446,6 +449,10 @@ std::optional<std::string> contradiction_of_mode(const MrcHeader& header) {
 void warn_of_mode(const MrcHeader& header, const std::string& name) {
   if (const auto contradiction = contradiction_of_mode(header))
     base::log_warning(fmt::format("'{}' {}", name, *contradiction));
+}
+
+bool is_phase_flipped(const MrcHeader& header) {
+  return header.is_ctf_corrected || is_in_labels(header, "ctfphaseflip");
 }
 
 bool is_in_labels(const MrcHeader& header, std::string_view word) {

@@ -102,6 +102,9 @@ double cubic_voxel_size_A(const MrcHeader& header, const std::filesystem::path& 
 /// A label of volumes that were turned before they were sampled. Their ORIGIN is 0, and no place.
 inline constexpr const char* kLabelOfTurnedBox = "turned: ORIGIN is not its place";
 
+/// Tells whether a stack went through IMOD's ctfphaseflip, by its labels or IMOD's flag.
+bool is_phase_flipped(const MrcHeader& header);
+
 /// Says of a file, as the rest of a sentence, that its header states values that its mode cannot
 /// hold: programs have written unsigned numbers as signed ones, and the other way round. Returns
 /// nothing if it does not.

@@ -44,11 +44,9 @@ struct MrcReader::Impl {
     if (records.layout == ExtendedLayout::kNone) return;
     // Files of several megabytes of metadata have records for no more than some thousand sections.
     constexpr std::int64_t kMostBytes = std::int64_t{1} << 24;
-    const std::int64_t needed = records.bytes_per_section > 0
-                                    ? records.bytes_per_section * header.nz
-                                    : std::min(header.extended_header_bytes, kMostBytes);
-    if (needed > kMostBytes) return;
-    std::vector<std::byte> extended(static_cast<std::size_t>(needed));
+    if (records.bytes_per_section * header.nz > kMostBytes) return;
+    std::vector<std::byte> extended(
+        static_cast<std::size_t>(std::min(header.extended_header_bytes, kMostBytes)));
     file.read_at(kMrcHeaderBytes, extended.data(), extended.size());
     read_extended_records(extended, records, header);
   }

@@ -58,6 +58,7 @@ struct MdocSection {
   int line = 0;              ///< line of the tilt angle, or of the section's head without one
   std::optional<double> tilt_deg;
   std::optional<double> prior_dose;  ///< PriorRecordDose: electrons / Å² before this section
+  int frame_doses_line = 0;          ///< of FrameDosesAndNumber, if it states doses
   std::optional<double> dose;        ///< ExposureDose: electrons / Å² of this section; 0: unknown
   std::optional<std::int64_t> time_s;       ///< DateTime, in seconds from some day on
   int unread_time_line = 0;                 ///< line of a DateTime that cannot be read, or 0

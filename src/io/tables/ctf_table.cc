@@ -41,7 +41,10 @@ CtfTable read_ctf(const std::filesystem::path& path) {
 CtfTable read_warp_ctf(const std::filesystem::path& path) {
   const ViewTable series = read_warp_xml(path);
   CtfTable table{path, {}, series.optics, series.ctf_not_applied};
+  table.defocus_hand = series.defocus_hand;
   for (const ListedView& view : series.views) {
+    table.images.push_back(view.image);
+    table.dose_before.push_back(view.dose_before);
     table.views.push_back(view.defocus);
     table.tilt_deg.emplace_back(view.tilt_deg);
   }

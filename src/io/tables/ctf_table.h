@@ -25,6 +25,9 @@ struct CtfTable {
   bool goes_on = false;  ///< the last defocus holds for all views after it, as in IMOD
   /// AreTomo's, whose rows are those of its alignment, sorted by tilt.
   bool is_of_aretomo = false;
+  std::vector<std::string> images = {};  ///< of `views`, as the file names them; empty: it does not
+  std::vector<std::optional<double>> dose_before = {};  ///< of `views`, as in ListedView
+  std::optional<int> defocus_hand = {};                 ///< as in a ViewTable
 };
 
 /// Reads the contrast transfer of each view from any of these files, which it recognises by the end

@@ -328,6 +328,9 @@ void read_section_entry(const std::filesystem::path& path, const TextLine& line,
     section->prior_dose = require_dose(path, line, entry);
   } else if (entry.key == "ExposureDose") {
     section->dose = require_dose(path, line, entry);
+  } else if (entry.key == "FrameDosesAndNumber") {
+    const auto of_frame = parse_number(split_words(entry.value).front());
+    if (!of_frame || *of_frame != 0.0) section->frame_doses_line = line.number;
   } else if (entry.key == "DateTime") {
     section->time_s = parse_time(entry.value);
     section->unread_time_line = section->time_s ? 0 : line.number;

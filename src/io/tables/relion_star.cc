@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <optional>
 #include <span>
 
 #include "io/tables/ctf_table.h"
 #include "io/tables/text_lines.h"
+#include "io/tables/unknown_entries.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -164,13 +164,6 @@ ListedView view_of(const StarRow& row, const StarTable& table, bool is_nominal) 
   return view;
 }
 
-// Tells whether an entry states something other than zeros, such as a number or "nan".
-bool is_not_zero(const std::string& text) {
-  return text != "None" && std::ranges::any_of(text, [](unsigned char c) {
-           return (c >= '1' && c <= '9') || (std::isalpha(c) != 0 && c != 'e' && c != 'E');
-         });
-}
-
 bool is_not_one(const std::string& text) {
   const auto number = parse_number(text);
   return number ? *number != 1.0 : is_not_zero(text);
@@ -222,10 +215,13 @@ void note_missing_defocus(const StarTable& table, ViewTable& views) {
         fmt::format("no complete defocus in row {}", gap - views.views.begin() + 1));
 }
 
-}  // namespace
-
-bool lists_tomograms(const std::filesystem::path& path) {
-  return find_table(read_star_file(path), "rlnTomoTiltSeriesStarFile") != nullptr;
+// Remarks on the columns of all tables that are not known.
+void note_unknown_columns(const std::vector<StarTable>& tables, ViewTable& views) {
+  std::vector<std::string> unknown;
+  for (const StarTable& table : tables)
+    for (const std::string& column : unknown_columns(table, known_view_columns()))
+      unknown.push_back(column);
+  if (const auto remark = remark_on_unknown(unknown)) views.remarks.push_back(*remark);
 }
 
 // Throws Error if a table beside that of the tomograms states something of them.
@@ -240,6 +236,12 @@ void require_one_table(const std::filesystem::path& path, const std::vector<Star
             fmt::format("'{}' states _{} in its table 'data_{}', and RELION has it in that of the "
                         "tomograms, 'data_{}': move it there, or leave it out",
                         path.string(), column, other.name(), of_tomograms.name()));
+}
+
+}  // namespace
+
+bool lists_tomograms(const std::filesystem::path& path) {
+  return find_table(read_star_file(path), "rlnTomoTiltSeriesStarFile") != nullptr;
 }
 
 RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
@@ -265,6 +267,7 @@ RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
     tomogram.optics = optics_by([&](const char* column) { return row.find_number(column); });
     tomogram.mtf = row.find_text("rlnMtfFileName").value_or("");
     tomogram.not_applied = distortions_of({table, 1}, i);
+    tomogram.remark = remark_on_unknown(unknown_columns(*table, known_tomogram_columns()));
     tomogram.size_px = size_of(row, where);
     all.tomograms.push_back(std::move(tomogram));
   }
@@ -309,6 +312,7 @@ ViewTable read_relion_views(const std::filesystem::path& path) {
   views.defocus_hand =
       defocus_hand_of(only_number(path, tables, "rlnTomoHand"), fmt::format("'{}'", path.string()));
   note_missing_defocus(table, views);
+  note_unknown_columns(tables, views);
   return views;
 }
 
@@ -322,9 +326,13 @@ CtfTable read_relion_ctf(const std::filesystem::path& path) {
         path.string()));
   }
   CtfTable ctf{path, {}, optics_of(path, tables), distortions_of(tables)};
+  ctf.defocus_hand =
+      defocus_hand_of(only_number(path, tables, "rlnTomoHand"), fmt::format("'{}'", path.string()));
   for (std::size_t i = 0; i < table->num_rows(); ++i) {
     const StarRow row(path, *table, i);
     ctf.views.push_back(defocus_of(row, *table));
+    if (const auto image = row.find_text("rlnMicrographName")) ctf.images.push_back(*image);
+    ctf.dose_before.push_back(row.find_dose("rlnMicrographPreExposure"));
     ctf.tilt_deg.push_back(
         row.find_number("rlnTomoNominalStageTiltAngle", base::kLargestAngle_deg));
     if (!ctf.tilt_deg.back())

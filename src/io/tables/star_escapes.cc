@@ -86,6 +86,15 @@ std::vector<std::size_t> odd_values(const std::vector<Word>& words) {
   return places;
 }
 
+// Adds the places in quoted words where gemmi would see the end of the quotes: a quote of theirs
+// before the sign of a comment.
+void add_comment_signs(const std::vector<Word>& words, std::vector<std::size_t>& places) {
+  for (const Word& word : words)
+    for (std::size_t i = 2; word.is_quoted && i < word.text.size(); ++i)
+      if (word.text[i] == '#' && word.text[i - 1] == word.text[0]) places.push_back(word.begin + i);
+  std::ranges::sort(places);
+}
+
 std::string escape(unsigned char byte) { return fmt::format("{}{:02X}", kEscape, byte); }
 
 // Returns a line with the bytes at some places escaped, and those that no word of CIF has.
@@ -121,8 +130,13 @@ std::string escaped_star(std::string_view text) {
     std::string_view line = text.substr(0, end);
     if (line.ends_with('\r')) line.remove_suffix(1);
     const bool turns = line.starts_with(';');
-    escaped += escaped_line(
-        line, is_in_text || turns ? std::vector<std::size_t>{} : odd_values(words_of(line)));
+    std::vector<std::size_t> places;
+    if (!is_in_text && !turns) {
+      const std::vector<Word> words = words_of(line);
+      places = odd_values(words);
+      add_comment_signs(words, places);
+    }
+    escaped += escaped_line(line, places);
     if (turns) is_in_text = !is_in_text;
     if (end < text.size()) escaped += '\n';
     text.remove_prefix(std::min(end + 1, text.size()));

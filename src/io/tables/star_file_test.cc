@@ -44,6 +44,7 @@ TEST(StarFile, RefusesWhatIsNoStarFile) {
         "data_x\n_a 'never ends\n", "data_x\n_a\n"})
     expect_parts(refusal(bad), {"a.star", "no STAR file"});
   expect_parts(refusal("data_x\nloop_\n_a #1\n_b #2\n1 2 3\n"), {"line:2:1"});
+  expect_parts(refusal("data_x\n_a 1\nsave_part\n_b 2\nsave_\n"), {"a.star", "save frame", "part"});
   expect_parts(refusal(std::string(100, '\0')), {"a.star", "zero bytes"});
   EXPECT_TRUE(read_star_file(scratch.write("a.star", "")).empty());
 }
@@ -144,7 +145,7 @@ TEST(StarFile, ReadsWordsThatRelionWritesAsTheyAre) {
       "a.star",
       "# für\ndata_Müller\n\nloop_\n_näme #1\n_b #2\r\n"
       "TS_Müller frames/Bü_0.eer # ü\ndata_01 data_02\n$A _old/A.star\nloop_1 \"_a b\"\n"
-      "x ~%41\n'é ~%' \"data_ it's\"\nx\n;first ü\r\ndata_x y\r\n;\n\n"
+      "x ~%41\n'é ~%' \"data_ it's\"\n'A'#1' 'b'#c d' # note\nx\n;first ü\r\ndata_x y\r\n;\n\n"
       "data_next\n_single data_01\n"));
   ASSERT_EQ(tables.size(), 2u);
   EXPECT_EQ(tables[0].name(), "Müller");
@@ -154,6 +155,7 @@ TEST(StarFile, ReadsWordsThatRelionWritesAsTheyAre) {
                                                               {"loop_1", "_a b"},
                                                               {"x", "~%41"},
                                                               {"é ~%", "data_ it's"},
+                                                              {"A'#1", "b'#c d"},
                                                               {"x", "first ü\ndata_x y"}};
   ASSERT_EQ(tables[0].num_rows(), rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {

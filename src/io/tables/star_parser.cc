@@ -3,6 +3,7 @@
 #include "io/tables/star_parser.h"
 
 #include <gemmi/cif.hpp>
+#include <stdexcept>
 #include <utility>
 
 namespace tomofield::io {
@@ -34,6 +35,9 @@ void append_tables(const cif::Block& block, std::vector<ParsedTable>& tables) {
   const std::string name = block.name == "#" || block.name == " " ? "" : block.name;
   ParsedTable single{name, {}, {{}}};
   for (const cif::Item& item : block.items) {
+    if (item.type == cif::ItemType::Frame)
+      throw std::runtime_error("the save frame 'save_" + item.frame.name +
+                               "', which no table of RELION or Warp has: leave it out");
     if (item.type == cif::ItemType::Loop) tables.push_back(table_of_loop(name, item.loop));
     if (item.type != cif::ItemType::Pair) continue;
     single.columns.push_back(column_name(item.pair[0]));

@@ -69,7 +69,7 @@ struct ViewTable {
   std::optional<double> thickness_A;     ///< of the volume that the other program makes
   std::vector<std::string> not_applied;  ///< what the file has and a rigid alignment cannot honour
   std::vector<std::string> ctf_not_applied{};  ///< the same of the contrast transfer
-  std::vector<std::string> remarks{};          ///< sentences on what the file does not have
+  std::vector<std::string> remarks{};          ///< sentences on what the file lacks, or has in vain
   std::optional<std::array<double, 2>> image_size_A{};  ///< width and height
   StatedOptics optics{};
   /// 1 or −1: the right or the left side of an aligned view at a positive tilt_deg is farther from

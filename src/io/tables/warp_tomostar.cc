@@ -1,10 +1,22 @@
 #include <fmt/format.h>
 
+#include <array>
+#include <string_view>
+
 #include "io/tables/star_file.h"
+#include "io/tables/unknown_entries.h"
 #include "io/tables/view_table.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
+namespace {
+
+// Those that are read, and what Warp measured of the images.
+constexpr std::array<std::string_view, 8> kKnownColumns{
+    "wrpMovieName",   "wrpAngleTilt", "wrpAxisAngle",        "wrpAxisOffsetX",
+    "wrpAxisOffsetY", "wrpDose",      "wrpAverageIntensity", "wrpMaskedFraction"};
+
+}  // namespace
 
 // Warp projects a point of the specimen by Rz(axis angle) Ry(−angle) and adds the offset
 // (WarpLib's TiltSeries.GetPositionInAllTilts with Matrix3.Euler). `ts_import` negates the angles
@@ -34,6 +46,8 @@ ViewTable read_warp_tomostar(const std::filesystem::path& path) {
     views.remarks.emplace_back(
         "it has no shifts, so the views are aligned only by angles; "
         "the XML file of an aligned series has them");
+  if (const auto remark = remark_on_unknown(unknown_columns(tables.front(), kKnownColumns)))
+    views.remarks.push_back(*remark);
   return views;
 }
 

@@ -8,12 +8,14 @@
 #include <optional>
 #include <pugixml.hpp>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "io/tables/text_lines.h"
+#include "io/tables/unknown_entries.h"
 #include "io/tables/view_table.h"
 #include "tomofield/error.h"
 
@@ -197,7 +199,62 @@ class WarpXml {
     return names;
   }
 
+  // Tells whether the user took the series out of Warp's selection.
+  bool is_unselected() const {
+    const std::string_view flag = root_.attribute("UnselectManual").value();
+    return !flag.empty() && flag != "null" && parse_flag(flag, "UnselectManual");
+  }
+
+  // Returns the attributes of the series and its elements but grids that nothing here knows.
+  std::vector<std::string> unknown_entries() const {
+    std::vector<std::string> unknown;
+    for (const pugi::xml_attribute& attribute : root_.attributes())
+      if (!is_known(kKnownAttributes, attribute.name()) && is_not_zero(attribute.value()))
+        unknown.emplace_back(attribute.name());
+    for (const pugi::xml_node& node : root_.children()) {
+      const std::string_view name = node.name();
+      if (name.empty() || name.starts_with("Grid") || name.starts_with("Options")) continue;
+      if (!is_known(kKnownElements, name)) unknown.push_back(fmt::format("<{}>", name));
+    }
+    std::ranges::sort(unknown);
+    unknown.erase(std::ranges::unique(unknown).begin(), unknown.end());
+    return unknown;
+  }
+
  private:
+  // Those that are read, and what Warp keeps of its own fits and choices (TiltSeries.cs, SaveMeta).
+  static constexpr std::array<std::string_view, 13> kKnownAttributes{"AreAnglesInverted",
+                                                                     "LevelAngleX",
+                                                                     "LevelAngleY",
+                                                                     "MagnificationCorrection",
+                                                                     "VolumeDimensionsAngstrom",
+                                                                     "ImageDimensionsAngstrom",
+                                                                     "UnselectManual",
+                                                                     "UnselectFilter",
+                                                                     "DataDirectory",
+                                                                     "PlaneNormal",
+                                                                     "Bfactor",
+                                                                     "Weight",
+                                                                     "CTFResolutionEstimate"};
+  static constexpr std::array<std::string_view, 14> kKnownElements{"Angles",
+                                                                   "Dose",
+                                                                   "UseTilt",
+                                                                   "AxisAngle",
+                                                                   "AxisOffsetX",
+                                                                   "AxisOffsetY",
+                                                                   "CTF",
+                                                                   "FOVFraction",
+                                                                   "MoviePath",
+                                                                   "TiltPS1D",
+                                                                   "PS1D",
+                                                                   "TiltSimulatedScale",
+                                                                   "SimulatedScale",
+                                                                   "SimulatedBackground"};
+
+  static bool is_known(std::span<const std::string_view> known, std::string_view name) {
+    return std::ranges::find(known, name) != known.end();
+  }
+
   // A node of a grid: its layer, its value, and its share in the mean of the layer.
   struct GridNode {
     std::size_t layer;
@@ -424,6 +481,10 @@ ViewTable read_warp_xml(const std::filesystem::path& path) {
       table.ctf_not_applied.emplace_back(fmt::format("aberrations beside the defocus ({})", name));
   if (xml.is_stretched())
     table.not_applied.emplace_back("a MagnificationCorrection, which stretches the images");
+  if (xml.is_unselected())
+    table.remarks.emplace_back("the series is not selected in Warp (UnselectManual)");
+  if (const auto remark = remark_on_unknown(xml.unknown_entries()))
+    table.remarks.push_back(*remark);
   return table;
 }
 

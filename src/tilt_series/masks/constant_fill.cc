@@ -9,21 +9,35 @@ namespace {
 
 constexpr std::size_t kMinFillPixels = 64;
 
+/// A region of equal values.
+struct Region {
+  std::vector<std::size_t> pixels;
+  std::int64_t num_edges = 0;  ///< between its pixels and measured ones of other values
+
+  /// Tells whether its outline is no longer than that of the area outside a rotated image, which
+  /// is at least a line of pixels wide. Equal values of measurements, which have few levels,
+  /// surround others everywhere.
+  bool has_short_outline(const MaskedImage& image) const {
+    return num_edges <= 3 * (image.width + image.height) && 4 * num_edges <= 5 * std::ssize(pixels);
+  }
+};
+
 /// Finds regions of equal value and visits each pixel once.
 class RegionFinder {
  public:
   explicit RegionFinder(const MaskedImage& image) : image_(image), seen_(image.valid.size()) {}
 
-  /// Returns the pixels 4-connected to `seed` that have its value; empty if it was visited before.
-  const std::vector<std::size_t>& region_of(std::size_t seed) {
-    region_.clear();
+  /// Returns the pixels 4-connected to `seed` that have its value; none if it was visited before.
+  const Region& region_of(std::size_t seed) {
+    region_ = {};
     visit(seed, image_.values[seed]);
-    for (std::size_t next = 0; next < region_.size(); ++next) {
-      const auto at = static_cast<std::int64_t>(region_[next]);
+    for (std::size_t next = 0; next < region_.pixels.size(); ++next) {
+      const std::size_t pixel = region_.pixels[next];
+      const auto at = static_cast<std::int64_t>(pixel);
       const std::int64_t x = at % image_.width, y = at / image_.width;
-      const float value = image_.values[region_[next]];
-      if (x > 0) visit(region_[next] - 1, value);
-      if (x + 1 < image_.width) visit(region_[next] + 1, value);
+      const float value = image_.values[pixel];
+      if (x > 0) visit(pixel - 1, value);
+      if (x + 1 < image_.width) visit(pixel + 1, value);
       if (y > 0) visit(image_.index(x, y - 1), value);
       if (y + 1 < image_.height) visit(image_.index(x, y + 1), value);
     }
@@ -32,14 +46,16 @@ class RegionFinder {
 
  private:
   void visit(std::size_t at, float value) {
-    if (seen_[at] || !image_.valid[at] || image_.values[at] != value) return;
+    if (!image_.valid[at]) return;
+    if (image_.values[at] != value) ++region_.num_edges;
+    if (seen_[at] || image_.values[at] != value) return;
     seen_[at] = 1;
-    region_.push_back(at);
+    region_.pixels.push_back(at);
   }
 
   const MaskedImage& image_;
   std::vector<std::uint8_t> seen_;
-  std::vector<std::size_t> region_;
+  Region region_;
 };
 
 /// Returns the value that space without specimen has where there is no noise.
@@ -113,8 +129,9 @@ void mask_constant_fill(Contrast contrast, MaskedImage* image) {
     for (const std::int64_t x : {std::int64_t{0}, image->width - 1}) {
       const std::size_t corner = image->index(x, y);
       if (image->values[corner] == empty) continue;
-      const auto& region = finder.region_of(corner);
-      if (region.size() >= kMinFillPixels) fill.insert(fill.end(), region.begin(), region.end());
+      const Region& region = finder.region_of(corner);
+      if (region.pixels.size() >= kMinFillPixels && region.has_short_outline(*image))
+        fill.insert(fill.end(), region.pixels.begin(), region.pixels.end());
     }
   }
   for (const bool is_rows : {false, true}) {

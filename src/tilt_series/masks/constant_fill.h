@@ -9,7 +9,8 @@ namespace tomofield::tilt_series {
 
 /// Marks fill of exactly one value as no measurement: connected regions of
 /// at least 64 equal pixels that hold a corner of the image. The area outside a rotated or
-/// shifted image always holds one.
+/// shifted image always holds one. Its outline is short: views of few grey levels have large
+/// regions of one value, too, with measurements of others all over them.
 ///
 /// Space without specimen looks the same where there is no noise. A region at
 /// its value (the smallest of a bright image, the largest of a dark one) is

@@ -62,6 +62,18 @@ TEST(ConstantFill, SpaceWithoutSpecimenIsAMeasurement) {
   EXPECT_GT(mask_fill(Contrast::kBright, &mean_fill), 100);
 }
 
+TEST(ConstantFill, ViewsOfFewGreyLevelsAreMeasurements) {
+  base::Random random(5);
+  for (const double part : {0.1, 0.4, 0.5, 0.6, 0.9}) {
+    MaskedImage image(kSize, kSize);
+    for (float& value : image.values) value = random.uniform() < part ? 1.0f : 2.0f;
+    image.values[0] = 3.0f;  // empty space, in bright or dark views
+    image.values[image.values.size() / 2] = 0.0f;
+    EXPECT_EQ(mask_fill(Contrast::kDark, &image), 0) << part;
+    EXPECT_EQ(mask_fill(Contrast::kBright, &image), 0) << part;
+  }
+}
+
 TEST(ConstantFill, StripsOfAShiftAreMaskedWhereNoiseBeginsBesideThem) {
   base::Random random(2);
   MaskedImage noisy(kSize, kSize), noiseless(kSize, kSize);
