@@ -16,12 +16,18 @@ constexpr std::size_t kMinDifferences = 64;
 // part in a thousand.
 constexpr std::int64_t kEnoughDifferences = 1 << 20;
 
-/// Returns the standard deviation that rounding to steps of the smallest difference makes.
+/// Returns the standard deviation that rounding to steps of the smallest difference makes, or what
+/// all differences leave for it, as where nearly all of them are 0.
 double sigma_of_rounding(const std::vector<float>& differences) {
-  float step = std::numeric_limits<float>::infinity();
-  for (const float difference : differences)
-    if (difference != 0.0f) step = std::min(step, std::fabs(difference));
-  return std::isfinite(step) ? static_cast<double>(step) / std::sqrt(12.0) : 0.0;
+  double step = std::numeric_limits<double>::infinity(), squares = 0.0;
+  for (const float difference : differences) {
+    const double size = std::fabs(static_cast<double>(difference));
+    if (size > 0.0) step = std::min(step, size);
+    squares += size * size;
+  }
+  if (!std::isfinite(step)) return 0.0;
+  return std::min(step / std::sqrt(12.0),
+                  std::sqrt(squares / static_cast<double>(differences.size())) / 2.0);
 }
 
 /// Returns the estimate from mixed second differences at the image's own scale; 0 if there are too

@@ -82,6 +82,9 @@ TEST(Noise, OfFewGreyLevelsIsAtLeastThatOfRounding) {
   for (float& value : view.values) value = std::round(value / 60.0f);
   EXPECT_GE(estimate_noise_sigma(view), 1 / std::sqrt(12.0));
   EXPECT_LE(estimate_noise_sigma(view), 0.6);
+  base::Random random(5);  // sparse counts
+  for (float& value : view.values) value = random.uniform() < 0.02 ? 1.0f : 0.0f;
+  EXPECT_NEAR(estimate_noise_sigma(view), std::sqrt(0.02 * 0.98), 0.02);
 }
 
 TEST(Noise, NeverZero) {
