@@ -175,6 +175,12 @@ std::optional<std::array<double, 3>> place_A(const io::MrcReader& volume) {
 void require_whole(const std::filesystem::path& path) {
   const io::MrcReader volume(path);
   const auto place = place_A(volume);
+  const std::array<double, 3>& origin_A = volume.header().origin_A;
+  if (!place && !is_turned(volume) && origin_A != std::array{0.0, 0.0, 0.0})
+    base::log_warning(fmt::format(
+        "'{}' has an ORIGIN of {:.6g}, {:.6g}, {:.6g} Å by another program, and positions count "
+        "from its first voxel",
+        path.string(), origin_A[0], origin_A[1], origin_A[2]));
   if (!is_turned(volume) && (!place || *place == std::array{0.0, 0.0, 0.0})) return;
   throw Error(fmt::format("'{}' is {}, and the list has positions in the whole volume: give that",
                           path.string(),

@@ -29,8 +29,8 @@ std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const View
 /// and `hand` is SpecimenOptions::hand. The result is empty if the options name neither a contrast
 /// transfer nor a dose nor a detector, so that the views are plain projections. The defocus is that
 /// on the tilt axis, and its slope is that of the middle plane of the specimen, on the side that
-/// --defocus-hand says, else --hand. Doses come from --dose-per-tilt, else from --mdoc, else from
-/// the table of views that is the stack. Logs what it took. Throws Error if the pixel size is not
+/// --defocus-hand says, else the file of --ctf, else --hand. find_exposures() says where doses come
+/// from. Logs what it took. Throws Error if the pixel size is not
 /// known, and for a file that is not of this stack or has no defocus of a view.
 std::vector<microscope::ViewTransfer> view_transfers(const tilt_series::TiltSeriesOptions& input,
                                                      int hand,

@@ -152,7 +152,9 @@ RunPlan plan_run(const tilt_series::PlannedSeries& series, const options::Recons
   run.memory_bytes = run.tiles.is_used()
                          ? run.tiles.memory_bytes
                          : estimate_memory({series, plan, domain, options, processes}, run.stages);
-  if (const int most_trials = given.num_trials(num_fitted_views(plan, given.fit), open);
+  // Trials of a background count where the views may ask for them and leaves make them large.
+  if (const int most_trials = given.num_trials(num_fitted_views(plan, given.fit),
+                                               run.has_large_leaves ? open : planned);
       most_trials > 0 && !plan.ray_geometry)
     run.memory_bytes =
         std::max(run.memory_bytes, memory_of_trials(plan, options, most_trials, processes));

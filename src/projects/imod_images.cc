@@ -127,7 +127,10 @@ void warn_of_corrections(Project& project, const fs::path& aligned) {
 // Returns the binning of the aligned stack. Throws Error if the two command files differ.
 double find_bin(Project& project, CommandEntries& tilt, CommandEntries* newst, bool is_raw) {
   const auto of_tilt = tilt.number("IMAGEBINNED");
-  const auto of_newst = newst == nullptr ? std::nullopt : newst->number("BinByFactor");
+  auto of_newst = newst == nullptr ? std::nullopt : newst->number("BinByFactor");
+  constexpr double kBinOfNewstack = 1.0;  // without the entry
+  if (newst != nullptr && !of_newst && of_tilt && !project.ignores("BinByFactor"))
+    of_newst = kBinOfNewstack;
   if (of_tilt && of_newst && *of_tilt != *of_newst) {
     throw Error(fmt::format(
         "'{}' has BinByFactor {} and '{}' IMAGEBINNED {}, so lengths cannot be told: align the "

@@ -250,10 +250,17 @@ void warn_of_other_transfer(Project& project, const CtfCommand& command) {
 }  // namespace
 
 bool set_transfer_files(Project& project, const fs::path& folder, const std::string& name) {
+  std::optional<fs::path> found;
   for (const char* ending : {".defocus", "_CTF.txt", "_ctf.txt", "_ctf.star"}) {
     const fs::path file = folder / (name + ending);
-    if (io::is_file(file)) return set_transfer_file(project, file, file);
+    if (!io::is_file(file)) continue;
+    if (found && !project.ignores(kEntryOfCtf))
+      project.warn(
+          fmt::format("'{}' lies beside '{}', which is read (give the right one with --ctf)",
+                      file.string(), found->string()));
+    if (!found) found = file;
   }
+  if (found) return set_transfer_file(project, *found, *found);
   if (project.request().has_transfer) set_mtf(project, folder);
   return false;
 }

@@ -141,7 +141,8 @@ record::HalvesRecord halves_record(const Run& run, const FinishedFits& fits,
 
 std::string crossing_text(const evaluate::Fsc& fsc, double threshold) {
   const auto at = evaluate::crossing_A(fsc.frequency_per_A, fsc.all, threshold);
-  return at ? fmt::format("at {:.4g} Å", *at) : "nowhere";
+  if (at) return fmt::format("at {:.4g} Å", *at);
+  return evaluate::starts_below(fsc.all, threshold) ? "from the first shell on" : "nowhere";
 }
 
 // Says what the halves are for and what they are not.

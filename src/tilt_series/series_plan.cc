@@ -145,6 +145,38 @@ std::optional<SectionTable> find_section_table(const TiltSeriesOptions& options,
   return sections_of_views(io::read_view_table(options.stack), stack, pixel_size_A);
 }
 
+// A table of views whose alignment another file replaces (--aln, --xf). The views that it leaves
+// out stay so.
+class ReplacedTable {
+ public:
+  ReplacedTable(const TiltSeriesOptions& options, const io::ImageStack& stack,
+                const std::optional<SectionTable>& table, double pixel_size_A) {
+    if (options.images || !io::is_view_table(options.stack)) return;
+    if (options.aln)
+      table_ = sections_of_views(io::read_view_table(options.stack), stack, pixel_size_A);
+    else if (options.xf)
+      table_ = table;
+  }
+
+  /// Adds the sections that the table leaves out to some that are sorted.
+  void exclude_unused(std::vector<std::int64_t>& excluded) const {
+    for (std::size_t i = 0; table_ && i < table_->of_section.size(); ++i)
+      if (!table_->of_section[i]) excluded.push_back(static_cast<std::int64_t>(i));
+    std::ranges::sort(excluded);
+  }
+
+  void warn_of_differences(const TiltAngles& angles, const InPlaneAlignment& alignment,
+                           const TiltSeriesOptions& options, const io::ImageStack& stack) const {
+    if (!table_ || table_->is_nominal) return;
+    if (options.aln) warn_of_other_angles(angles, *table_);
+    warn_of_other_axis({alignment_of_table(*table_).axis_deg(), "'" + table_->source + "'"},
+                       alignment.axis_deg(), options, stack);
+  }
+
+ private:
+  std::optional<SectionTable> table_;
+};
+
 void require_whole_images(const io::ImageStack& stack) {
   if (!stack.header().has_pieces) return;
   throw Error(fmt::format(
@@ -303,7 +335,9 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
   const auto table = find_section_table(options, stack, plan.pixel_size_A);
   const TiltAngles angles = find_tilt_angles(options, stack, table, mdoc);
   const std::vector<double> x_tilts_deg = find_x_tilts(options, stack, table);
-  const auto excluded = io::parse_section_list(options.exclude, header.nz);
+  const ReplacedTable replaced(options, stack, table, plan.pixel_size_A);
+  auto excluded = io::parse_section_list(options.exclude, header.nz);
+  replaced.exclude_unused(excluded);
 
   const bool has_alignment = options.xf || (table && !table->is_nominal);
   auto axis = find_stated_axis(options, stack, mdoc, has_alignment);
@@ -323,6 +357,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
     if (table && table->nominal_axis_deg && alignment && !options.xf)
       warn_of_other_axis({*table->nominal_axis_deg, "its _rlnTomoNominalTiltAxisAngle"},
                          alignment->axis_deg(), options, stack);
+    if (alignment) replaced.warn_of_differences(angles, *alignment, options, stack);
     if (alignment) warn_of_turned_views(alignment->axes_deg, alignment->axis_deg(), options, stack);
     if (options.tilt_axis_deg)
       warn_of_given_axis(*options.tilt_axis_deg, axis_of_files(options, stack, table, mdoc));

@@ -122,10 +122,11 @@ TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::ImageSta
   if (mdoc && (!is_of_others || extended.empty()))
     return angles_of_mdoc(*mdoc, *options.mdoc, stack);
   if (extended.empty()) {
-    throw Error(
-        fmt::format("no tilt angles for '{}': its header has none, so give them with --tlt FILE "
-                    "(.tlt or .rawtlt), --aln FILE (AreTomo) or --mdoc FILE (SerialEM)",
-                    stack.name()));
+    throw Error(fmt::format(
+        "no tilt angles for '{}': its header has {}, so give them with --tlt FILE "
+        "(.tlt or .rawtlt), --aln FILE (AreTomo) or --mdoc FILE (SerialEM)",
+        stack.name(),
+        stack.header().differences.empty() ? "none" : stack.header().differences.front()));
   }
   TiltAngles angles{source_of_header(stack), {}};
   for (const double tilt_deg : extended) angles.of_section.push_back(io::NumberLine{tilt_deg, 0});

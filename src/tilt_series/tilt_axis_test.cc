@@ -182,6 +182,17 @@ TEST(TiltAxis, OfALoneRotationThatAnAlignmentContradictsIsSaid) {
   EXPECT_EQ(warning_with(175), "");
 }
 
+TEST(TiltAxis, OfATitleWithoutBracketsCounts) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  options.mdoc =
+      scratch.write("a.mdoc",
+                    "T =     Tilt axis angle = 85.0, binning = 1  spot = 7\n[ZValue = 0]\n"
+                    "TiltAngle = -20\n[ZValue = 1]\nTiltAngle = -10\n[ZValue = 2]\n"
+                    "TiltAngle = 0\n");
+  expect_parts(refusal(options), {"a.mdoc", "line 1", "85°"});
+}
+
 TEST(TiltAngles, OfTwoFilesThatDifferAreSaid) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = small_series(scratch);  // -20, -10, 0

@@ -604,8 +604,13 @@ def test_the_file_of_a_config_cell_sets_what_a_column_may_set(data):
         for fact in ("line 2 of", f"'{line.split()[0]}'", "c.toml", "set by the batch"):
             assert fact in said.stderr, (fact, said.stderr)
         assert harness.contents(folder) == before
-    (folder / "c.toml").write_text("tv = 5\n", encoding="utf-8")
-    harness.succeed("batch", table, *QUICK, "-o", folder / "results", "--dry-run")
+    # As a cell does, it replaces options of the command line and of its configuration.
+    (folder / "c.toml").write_text("epochs = 7\nseed = 3\n", encoding="utf-8")
+    (folder / "all.toml").write_text("seed = 2\n", encoding="utf-8")
+    harness.succeed("batch", table, *QUICK, "--tv", 5, "--prior", "tv", "--config", folder / "all.toml",
+                    "-o", folder / "results")
+    fit = options_of(os.path.join(folder, "results", "a.mrc"))["fit"]
+    assert (fit["epochs"], fit["seed"]) == (7, 3), fit
 
 
 def test_a_name_like_an_option_gives_no_advice_on_files(data):
@@ -890,6 +895,20 @@ def test_a_task_that_cannot_be_submitted_again_says_so_in_the_summary(data):
     assert task.returncode == 128 + signal.SIGUSR1 and "at the limit" in said, (task.returncode, said)
     assert os.path.exists(model) and summary(results)["a"]["state"] == "stopped"
     assert "at the limit" in summary(results)["a"]["reason"]
+
+
+def test_a_series_that_lacks_the_choice_of_its_batch_says_so_in_the_summary(data):
+    """The task of Slurm that chooses was stopped, and those after it run all the same."""
+    folder = harness.fresh_directory("no_choice")
+    results = os.path.join(folder, "results")
+    at = QUICK.index("--tv-penalty")
+    environment = fake_sbatch(folder, "55\n")
+    harness.succeed("batch", *pattern(data), *QUICK[:at], *QUICK[at + 2:], "--slurm", "-o", results, env=environment)
+    task = subprocess.run(["sh", os.path.join(results, "batch.sbatch")], capture_output=True, text=True,
+                          env={**environment, "SLURM_ARRAY_TASK_ID": "1"})
+    assert task.returncode == 0 and "chooses for itself" in task.stderr, task
+    line = summary(results)["a"]
+    assert line["state"] == "done" and "made no choice" in line["reason"], line
 
 
 def test_a_series_that_ends_before_it_speaks_has_a_reason(data):

@@ -270,6 +270,8 @@ def test_particles_of_other_programs_are_no_positions_of_simulate():
     assert refusal("_rlnOriginXAngst", [0, 0]) == 0
     assert "_rlnOriginXAngst" in refusal("_rlnOriginXAngst", [0, 200])
     assert refusal("_rlnTomoName", ["TS_1", "TS_1"]) == 0
+    elsewhere = save("elsewhere.mrc", np.random.default_rng(1).random((24, 24, 24)), origin=(80, 0, 0))
+    assert "by another program" in run(elsewhere, "--particles", path("others.star")).stderr
     assert "several tomograms" in refusal("_rlnTomoName", ["TS_1", "TS_2"])
 
 
@@ -433,6 +435,15 @@ def test_the_wedge_is_where_no_view_looked():
     mirrored_measured, mirrored_missing = mean_correlation("-10,60")
     assert measured > mirrored_measured + 0.1 and missing < mirrored_missing - 0.1, (
         measured, missing, mirrored_measured, mirrored_missing)
+
+
+def test_a_correlation_that_begins_low_falls_at_once():
+    """One shell above a threshold does not make it fall later, or never."""
+    rng = np.random.default_rng(2)
+    pair = [save(name, rng.normal(size=(32, 32, 32))) for name in ("noise_a.mrc", "noise_b.mrc")]
+    said = run(pair[0], "--fsc", pair[1]).stdout
+    line = next(line for line in said.splitlines() if line.startswith("everywhere"))
+    assert line.split() == ["everywhere", "at", "once", "at", "once"], said
 
 
 def test_fsc_under_a_mask_and_in_a_box():

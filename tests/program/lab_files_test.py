@@ -722,6 +722,19 @@ def test_the_flag_of_imod_for_a_corrected_stack_counts_without_a_title():
         assert ("ctfphaseflip" in said) == is_said, said
 
 
+@pytest.mark.parametrize("unit, per_A", [(2, 1 / 2.54e8), (3, 1e-8), (4, None), (5, None), (1, None)])
+def test_the_unit_of_a_tiff_resolution_is_known_or_the_size_is_not(unit, per_A, tmp_path):
+    views = (1000 + 100 * bead_views(0, (56, 72))).astype(np.uint16)
+    per_unit = round(1 / (3.5 * (per_A or 1e-8)), 3)
+    tifffile.imwrite(tmp_path / "a.tif", views, photometric="minisblack", resolution=(per_unit, per_unit),
+                     resolutionunit=unit)
+    tilts = os.path.join(write_series("unit_of_tiff"), "TS_01.rawtlt")
+    said = dry(str(tmp_path), "a.tif", "--tlt", tilts)
+    stated_A = float(re.search(r"pixels, ([\d.]+) Å", said)[1])
+    assert stated_A == pytest.approx(3.5 if per_A else 1, rel=0.01), said  # tifffile rounds
+    assert ("--pixel-size" in said) == (per_A is None), said
+
+
 def test_a_stack_that_newstack_aligned_is_not_aligned_again_in_silence():
     folder = write_series("twice")
     with open(os.path.join(folder, "TS_01.xf"), "w", encoding="utf-8") as file:

@@ -138,7 +138,7 @@ def test_options_and_configuration_files_win(series):
     with open(report, encoding="utf-8") as file:
         assert f"given, in place of 24 ({os.path.join(folder, 'tilt.com')}: THICKNESS)" in file.read()
     # --angpix takes the place of --bin.
-    write_etomo(folder, series, "THICKNESS 24", "IMAGEBINNED 2")
+    write_etomo(folder, series, "THICKNESS 24", "IMAGEBINNED 2", newst=["BinByFactor 2"])
     planned = harness.succeed("reconstruct", folder, *REST, "--angpix", PIXEL_SIZE, "--dry-run", "-o",
                               "never.mrc").stdout
     assert "--bin 2" in planned and f"(not used: --angpix {PIXEL_SIZE} is given)" in planned

@@ -343,6 +343,23 @@ def test_the_microscope_of_a_project_counts_beside_a_given_defocus(series):
                 assert f"{option} " in said.stdout + said.stderr, (option, said)
 
 
+def test_an_alignment_beside_a_table_of_views(series):
+    """The views that the table leaves out stay so, and a contradiction is said."""
+    folder = harness.fresh_directory("replaced")
+    _, xml = star_projects.write_warp(folder, series)
+    with open(xml, encoding="utf-16") as file:
+        text = file.read()
+    with open(xml, "w", encoding="utf-16") as file:
+        file.write(text.replace("<UseTilt>True\nTrue", "<UseTilt>True\nFalse"))
+    transforms = os.path.join(folder, "a.xf")
+    with open(transforms, "w", encoding="utf-8") as file:
+        file.write("0 -1 1 0 0 0\n" * len(TILTS))
+    said = harness.succeed("reconstruct", xml, "--xf", transforms, "--thickness", THICKNESS, "--contrast", "bright",
+                           "--dry-run").stderr
+    assert f"{len(TILTS) - 1} of {len(TILTS)} sections" in said, said
+    assert "turns the views by a tilt axis" in said and "TS_01.xml' states 0.0°" in said, said
+
+
 def test_oblong_images_beside_a_pixel_size_of_relion_are_named(series):
     folder = harness.fresh_directory("oblong")
     star = star_projects.write_relion(folder, series)

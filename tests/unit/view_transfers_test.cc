@@ -230,6 +230,27 @@ TEST(ViewTransfers, DosesOfATableForTheContrastTransferCount) {
   EXPECT_EQ(exposures(options), (std::vector<double>{0, 0, 0, 0, 0}));
 }
 
+TEST(ViewTransfers, AnMdocWithoutDosesHidesNoOthers) {
+  const ScratchDirectory folder;
+  simulate::simulate_series(folder / "s", simulation(), false);
+  SeriesFiles files = files_in(folder);
+  std::vector<std::string> images;
+  for (const int number : {3, 2, 4, 1, 5}) images.push_back(fmt::format("{}@tilt_series", number));
+  files.ctf = folder.write("a.star", table_of(images));
+  std::string sections = "Voltage = 200\n";
+  for (int i = 0; i < 5; ++i)
+    sections += fmt::format("[ZValue = {}]\nTiltAngle = {}\n", i, 40 - 20 * i);
+  files.mdoc = folder.write("a.mdoc", sections);
+  Options options = options_of_run();
+  EXPECT_EQ(transfers_of(files, options)[0].exposure, 10.5);
+  options.views.dose_per_tilt = 2.0;
+  EXPECT_EQ(transfers_of(files, options)[0].exposure, 7.0);
+  options.views.voltage_kV = 300.0;  // as a project may state it
+  const testing::WarningCatcher caught;
+  transfers_of(files, options);
+  expect_parts(caught.text(), {"a.mdoc", "200 kV", "300 kV count"});
+}
+
 TEST(ViewTransfers, TheHandOfATableForTheContrastTransferCounts) {
   const ScratchDirectory folder;
   simulate::simulate_series(folder / "s", simulation(), false);

@@ -79,16 +79,19 @@ batch::KnownColumns known_columns(const CLI::App& reconstruct) {
   return known;
 }
 
-// Adds the options to `faults` that the file of a cell `config` sets, and that no table may set.
-void check_config(const batch::Series& series, const batch::KnownColumns& known,
-                  base::Faults& faults) {
+// Lets the options in the file of a cell `config` replace those of the command line. Adds those to
+// `faults` that no table may set.
+void read_config_cell(batch::Series& series, const batch::KnownColumns& known,
+                      base::Faults& faults) {
   for (const option_table::GivenOption& option : series.options) {
     if (option.flag != "--config" || !option.value) continue;
     try {
-      for (const std::string& name : names_in_config_file(*option.value))
+      for (const std::string& name : names_in_config_file(*option.value)) {
+        series.left_out.push_back("--" + name);
         if (known.kind_of("--" + name) == batch::ColumnKind::kNotHere)
           faults.add(fmt::format("{}: '{}' in '{}' is set by the batch: leave it out of the file",
                                  series.source, name, *option.value));
+      }
     } catch (const Error& error) {
       faults.add(fmt::format("{}: {}", series.source, error.what()));
     }
@@ -104,7 +107,7 @@ std::vector<batch::Series> read_series(const CLI::App& program, const std::strin
   if (ending != ".csv" && ending != ".tsv") return batch::expand_pattern(list);
   const batch::KnownColumns known = known_columns(*program.get_subcommand("reconstruct"));
   std::vector<batch::Series> all = batch::read_table(list, known, faults);
-  for (const batch::Series& series : all) check_config(series, known, faults);
+  for (batch::Series& series : all) read_config_cell(series, known, faults);
   return all;
 }
 

@@ -56,9 +56,7 @@ std::string crossing_text(const evaluate::Fsc& fsc, const evaluate::FscCurve& cu
                           double threshold) {
   if (const auto at = evaluate::crossing_A(fsc.frequency_per_A, curve, threshold))
     return fmt::format("{:.4g} Å", *at);
-  const bool is_above =
-      std::ranges::any_of(curve.correlation, [&](double value) { return value >= threshold; });
-  return is_above ? "never" : "at once";
+  return evaluate::starts_below(curve, threshold) ? "at once" : "never";
 }
 
 void print_crossings(const char* name, const evaluate::Fsc& fsc, const evaluate::FscCurve& curve) {

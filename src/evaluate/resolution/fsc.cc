@@ -343,6 +343,12 @@ std::optional<double> crossing_A(std::span<const double> frequency_per_A, const 
   return std::nullopt;
 }
 
+bool starts_below(const FscCurve& curve, double threshold) {
+  const auto first =
+      std::ranges::find_if(curve.correlation, [](double value) { return !std::isnan(value); });
+  return first == curve.correlation.end() || *first < threshold;
+}
+
 std::optional<double> correlation_at(std::span<const double> frequency_per_A, const FscCurve& curve,
                                      double resolution_A) {
   const double frequency = 1.0 / resolution_A;

@@ -99,6 +99,9 @@ class FscSums {
 Fsc fourier_shell_correlation(const base::Volume& first, const base::Volume& second,
                               const base::Volume& weights, const std::optional<TiltRange>& tilts);
 
+/// Tells whether the first shell of a curve that has a number is below `threshold`.
+bool starts_below(const FscCurve& curve, double threshold);
+
 /// Returns the resolution in Å at which a curve first falls below `threshold` on the way from low
 /// to high frequencies. It interpolates linearly in frequency between the shells. Returns nothing
 /// if the curve never falls below the threshold or starts below it.

@@ -27,7 +27,7 @@ class FilesStack : public ImageStack {
       std::shared_ptr<const ImageStack>& stack = opened[image.file];
       if (!stack) stack = open_image_stack(image.file);
       require_fits(image, stack->header());
-      take_tilts(stack->header(), tilts_deg);
+      take_tilt(image, stack->header(), tilts_deg);
       sections_.push_back({stack, image.section.value_or(0)});
     }
     header_.nz = std::ssize(images);
@@ -122,6 +122,10 @@ class FilesStack : public ImageStack {
     note("a tilt axis in degrees", axis(found), axis(header_));
     note("a voltage in kV", found.extended_voltage_kV, header_.extended_voltage_kV);
     header_.is_ctf_corrected |= is_phase_flipped(found);
+    header_.has_pieces |= found.has_pieces;
+    for (const std::string& label : found.labels)
+      if (std::ranges::find(header_.labels, label) == header_.labels.end())
+        header_.labels.push_back(label);
     if (!axis(header_)) header_.extended_axis_deg = axis(found);
     if (!header_.extended_voltage_kV) header_.extended_voltage_kV = found.extended_voltage_kV;
     if (!header_.extended_pixel_A) header_.extended_pixel_A = found.extended_pixel_A;
@@ -136,10 +140,12 @@ class FilesStack : public ImageStack {
         header_.differences.push_back(fmt::format("{} (in '{}')", difference, file));
   }
 
-  // Takes the tilts that the headers of single images state, if all do.
-  void take_tilts(const MrcHeader& found, std::vector<double>& tilts_deg) const {
-    if (found.nz == 1 && found.extended_tilt_deg.size() == 1)
-      tilts_deg.push_back(found.extended_tilt_deg.front());
+  // Takes the tilt that the header of an image's file states of it.
+  static void take_tilt(const ImageInFile& image, const MrcHeader& found,
+                        std::vector<double>& tilts_deg) {
+    const auto section = static_cast<std::size_t>(image.section.value_or(0));
+    if (section < found.extended_tilt_deg.size())
+      tilts_deg.push_back(found.extended_tilt_deg[section]);
   }
 
   std::string name_;

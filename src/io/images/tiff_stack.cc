@@ -123,7 +123,9 @@ class TiffFile {
     std::uint16_t unit = RESUNIT_NONE;
     TIFFGetField(handle_, TIFFTAG_XRESOLUTION, &across);
     TIFFGetField(handle_, TIFFTAG_YRESOLUTION, &down);
-    TIFFGetFieldDefaulted(handle_, TIFFTAG_RESOLUTIONUNIT, &unit);
+    // Without a unit, or with one that TIFF 6 does not have, such as tifffile's millimetres,
+    // libtiff would take inches.
+    TIFFGetField(handle_, TIFFTAG_RESOLUTIONUNIT, &unit);
     const double unit_A = unit == RESUNIT_CENTIMETER ? 1e8 : unit == RESUNIT_INCH ? 2.54e8 : 0.0;
     constexpr double kSmallest_A = 0.05, kLargest_A = 1000;
     const auto size_A = [&](float per_unit) {
@@ -387,10 +389,10 @@ class TiffStack : public ImageStack {
   [[noreturn]] void refuse(const TiffFile& file, const PageFormat& page) const {
     const auto kind = [](const PageFormat& of) {
       return fmt::format(
-          "{} × {} pixels of {} bits and {:.4g} × {:.4g} Å (photometric {}, "
-          "orientation {})",
+          "{} × {} pixels of {} bits and {:.4g} × {:.4g} Å (photometric {}, orientation {}, sample "
+          "format {}, in {})",
           of.width, of.height, of.bits, of.pixel_width_A, of.pixel_height_A, of.photometric,
-          of.orientation);
+          of.orientation, of.kind, of.is_tiled ? "tiles" : "strips");
     };
     file.fail(fmt::format("has pages of several kinds: page {} has {}, and the first {}",
                           pages_.size() + 1, kind(page), kind(format_)));

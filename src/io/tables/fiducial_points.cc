@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -26,8 +27,11 @@ struct PointFile {
       file.path.string(), line.number, quote(line.text), fault, file.what));
 }
 
+// The numbers of the object and the contour of a point, as far as its line has them.
+using Places = std::vector<double>;
+
 FiducialPoint parse_point(const PointFile& file, const TextLine& line,
-                          const std::vector<std::string_view>& words) {
+                          const std::vector<std::string_view>& words, Places& before) {
   std::vector<double> numbers;
   for (const std::string_view word : words) {
     const auto number = parse_number(word, base::kLargestPosition_px);
@@ -40,6 +44,12 @@ FiducialPoint parse_point(const PointFile& file, const TextLine& line,
   for (std::size_t i = 0; i < first; ++i)
     if (numbers[i] < 0 || numbers[i] != std::floor(numbers[i]))
       refuse(file, line, fmt::format("has '{}', which numbers no object or contour", words[i]));
+  Places here(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(first));
+  if (here < before)
+    refuse(file, line,
+           "has objects and contours in another order than they are numbered in: are these "
+           "positions, and scores behind them?");
+  before = std::move(here);
   return {numbers[first], numbers[first + 1], numbers[first + 2], line.number};
 }
 
@@ -50,6 +60,7 @@ std::vector<FiducialPoint> read_fiducial_points(const std::filesystem::path& pat
   const PointFile file{path, what};
   std::vector<FiducialPoint> points;
   std::size_t num_columns = 0;
+  Places before;
   for (const TextLine& line : read_text_lines(path)) {
     const auto words = split_words(line.text);
     if (words.size() < kMinColumns || words.size() > kMaxColumns) {
@@ -61,7 +72,7 @@ std::vector<FiducialPoint> read_fiducial_points(const std::filesystem::path& pat
           fmt::format("has {} columns where the lines before have {}", words.size(), num_columns));
     }
     num_columns = words.size();
-    points.push_back(parse_point(file, line, words));
+    points.push_back(parse_point(file, line, words, before));
   }
   if (points.empty()) throw Error(fmt::format("'{}' holds no {}", path.string(), what));
   return points;

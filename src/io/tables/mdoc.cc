@@ -420,7 +420,7 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
   EntriesOfSection entries;
   Magnifications magnifications;
   for (const TextLine& line : read_text_lines(path)) {
-    if (line.text.starts_with("[T")) {
+    if (line.text.starts_with("[T") || split_key_value(line.text).key == "T") {
       read_title(path, line, axes);  // stands anywhere, and does not end a section
       continue;
     }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "base/statistics.h"
 #include "evaluate/box.h"
@@ -17,6 +19,18 @@ namespace {
 constexpr double kCube_A = 8.0;
 constexpr std::size_t kMostGaussians = 50'000;
 
+// Returns the median of the outermost voxels of a map.
+double median_of_faces(const base::Volume& map) {
+  const base::Shape3& n = map.shape;
+  std::vector<float> faces;
+  for (std::int64_t z = 0; z < n.nz; ++z)
+    for (std::int64_t y = 0; y < n.ny; ++y)
+      for (std::int64_t x = 0; x < n.nx; ++x)
+        if (std::min({x, y, z, n.nx - 1 - x, n.ny - 1 - y, n.nz - 1 - z}) == 0)
+          faces.push_back(map.at(x, y, z));
+  return base::median(std::move(faces));
+}
+
 // Returns the potential in V of a unit of density. Sets `solvent` to the density below which there
 // is no protein.
 double potential_of_unit(const base::Volume& map, const std::filesystem::path& path,
@@ -26,6 +40,13 @@ double potential_of_unit(const base::Volume& map, const std::filesystem::path& p
     throw Error(fmt::format(
         "'{}' has no density above 0: give a map in which the particle is high and solvent near 0",
         path.string()));
+  constexpr double kMostSolvent = 0.1;
+  const double outside = median_of_faces(map);
+  if (std::fabs(outside) > kMostSolvent * high)
+    throw Error(fmt::format(
+        "'{}' has {:.4g} at its faces and up to {:.4g} within: give a map in which the particle is "
+        "high and solvent near 0",
+        path.string(), outside, high));
   double sum = 0.0, count = 0.0;
   for (const float value : map.data) {
     if (static_cast<double>(value) <= 0.5 * high) continue;

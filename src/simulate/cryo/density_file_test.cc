@@ -60,6 +60,11 @@ TEST(DensityFile, DoesNotDependOnTheScaleOfTheMap) {
 
 TEST(DensityFile, RefusesMapsWithoutDensityOrVoxelSize) {
   const testing::ScratchDirectory scratch;
+  const auto on_pedestal = write_ball(scratch / "pedestal.mrc", 30.0, 240.0f, 40.0f);
+  EXPECT_NE(testing::message_of<Error>([&] {
+              read_density(on_pedestal);
+            }).find("40 at its faces and up to 240"),
+            std::string::npos);
   EXPECT_THROW(read_density(write_ball(scratch / "dark.mrc", 30.0, -1.0f, 0.0f)), Error);
   EXPECT_THROW(read_density(write_ball(scratch / "bare.mrc", 30.0, 1.0f, 0.0f, 0.0)), Error);
   for (const float bad :
