@@ -5,9 +5,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <memory>
 #include <mutex>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -128,9 +130,46 @@ OwnThreads& current_threads() {
   return threads;
 }
 
-// The users of the threads, and what guards them and the asked number.
-std::mutex g_use_mutex;
-int g_num_users = 0;
+// Counts those who use the threads. A process that was forked has none of its parent's, and would
+// wait for ever for a lock that one of them held.
+class Users {
+ public:
+  void enter() {
+    for (int count = here(); !count_.compare_exchange_weak(count, count + 1);) count = here();
+  }
+  void leave() {
+    int count = here();
+    while (count > 0 && !count_.compare_exchange_weak(count, count - 1)) continue;
+  }
+  /// Calls change() while nobody uses the threads. Returns false if somebody does.
+  template <typename Change>
+  bool change_alone(const Change& change) {
+    int nobody = here();
+    if (nobody > 0 || !count_.compare_exchange_strong(nobody, kChanging)) return false;
+    change();
+    count_ = 0;
+    return true;
+  }
+
+ private:
+  static constexpr int kChanging = -1;
+
+  // Returns the number of users, when the threads are not changed.
+  int here() {
+    if (process_.exchange(getpid()) != getpid()) count_ = 0;
+    int count = count_;
+    for (; count == kChanging; count = count_) std::this_thread::yield();
+    return count;
+  }
+
+  std::atomic<int> count_ = 0;
+  std::atomic<pid_t> process_ = 0;
+};
+
+Users& users() {
+  static Users of_the_threads;
+  return of_the_threads;
+}
 
 Threads& threads() {
   static std::mutex mutex;
@@ -146,24 +185,19 @@ Threads& threads() {
 int thread_count() { return threads().workers().count(); }
 
 void set_thread_count(int count) {
-  const std::lock_guard lock(g_use_mutex);
-  if (g_num_users > 0)
+  const bool is_set = users().change_alone([count] {
+    g_asked_count = std::max(count, 0);
+    current_threads().reset();
+  });
+  if (!is_set)
     throw Error(
         "the number of threads stays while a call of tomofield works, in another thread or in "
         "that of a callback: set it before or after");
-  g_asked_count = std::max(count, 0);
-  current_threads().reset();
 }
 
-ThreadsInUse::ThreadsInUse() {
-  const std::lock_guard lock(g_use_mutex);
-  ++g_num_users;
-}
+ThreadsInUse::ThreadsInUse() { users().enter(); }
 
-ThreadsInUse::~ThreadsInUse() {
-  const std::lock_guard lock(g_use_mutex);
-  --g_num_users;
-}
+ThreadsInUse::~ThreadsInUse() { users().leave(); }
 
 void share_machine_with(int processes) {
   g_processes_on_machine = std::max(1, processes);
