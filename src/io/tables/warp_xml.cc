@@ -217,7 +217,7 @@ class WarpXml {
       if (!is_known(kKnownElements, name)) unknown.push_back(fmt::format("<{}>", name));
     }
     std::ranges::sort(unknown);
-    unknown.erase(std::ranges::unique(unknown).begin(), unknown.end());
+    unknown.erase(std::unique(unknown.begin(), unknown.end()), unknown.end());
     return unknown;
   }
 
