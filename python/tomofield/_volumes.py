@@ -31,8 +31,7 @@ class Tomogram:
     voxel_size_A: float
 
     def __post_init__(self) -> None:
-        if is_masked(self.values):
-            raise Error("a tomogram has no masked voxels: fill them (numpy.ma.filled)")
+        _require_unmasked(self.values)
         values = as_array(self.values)
         if values.ndim != 3:
             raise Error(f"a tomogram has values [z, y, x], and these have {values.ndim} dimensions")
@@ -67,8 +66,7 @@ class Tomogram:
         if not -self.shape[along] <= at < self.shape[along]:
             raise Error(f"there is no section {at} across {axis}: there are {self.shape[along]}")
         values = np.take(self.values, at, axis=along)
-        if is_masked(values):
-            raise Error("a tomogram has no masked voxels: fill them (numpy.ma.filled)")
+        _require_unmasked(values)  # somebody may set a mask later
         return np.asarray(values, np.float32)
 
     def write(self, path: Path, *, overwrite: bool = False) -> None:
@@ -82,6 +80,11 @@ class Tomogram:
     def _repr_html_(self) -> str:
         caption = f"Tomogram of {self._size()}: the middle XY section"
         return _pictures.figure(self.section(), caption)
+
+
+def _require_unmasked(values: Any) -> None:
+    if is_masked(values):
+        raise Error("a tomogram has no masked voxels: fill them (numpy.ma.filled)")
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "evaluate/speckle.h"
 #include "evaluate/volume_pair.h"
@@ -32,12 +31,7 @@ bool lies_elsewhere(const output::ModelOutline& model, const fs::path& path) {
   const io::MrcReader volume(path);
   if (is_turned(volume)) return true;
   const auto place = place_A(volume);
-  if (!place) return false;
-  const std::array<std::int64_t, 3> corner{model.roi.x0, model.roi.y0, 0};
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    if (std::fabs((*place)[axis] / model.pixel_size_A - static_cast<double>(corner[axis])) > 0.5)
-      return true;
-  return false;
+  return place && !lies_at(*place, model.roi, model.pixel_size_A);
 }
 
 void require_fit(const output::ModelOutline& model, const fs::path& path, const base::Shape3& shape,

@@ -141,18 +141,13 @@ void require_place(const std::filesystem::path& path, const measurement::Measure
         "the volume that `reconstruct` wrote, or `export` without an angle",
         path.string()));
   const auto place = place_A(volume);
-  if (!place) return;
-  const std::array<std::int64_t, 3> corner{series.roi.x0, series.roi.y0, 0};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double stated_px = (*place)[axis] / series.pixel_size_A;
-    if (std::fabs(stated_px - static_cast<double>(corner[axis])) < 0.5) continue;
-    throw Error(fmt::format(
-        "'{}' begins at {:.4g}, {:.4g}, {:.4g} pixels of the views (ORIGIN), and the "
-        "region at {}, {}, 0: give the --roi that it was made with, and its whole "
-        "thickness",
-        path.string(), (*place)[0] / series.pixel_size_A, (*place)[1] / series.pixel_size_A,
-        (*place)[2] / series.pixel_size_A, corner[0], corner[1]));
-  }
+  if (!place || lies_at(*place, series.roi, series.pixel_size_A)) return;
+  const auto& [x_A, y_A, z_A] = *place;
+  throw Error(fmt::format(
+      "'{}' begins at {:.4g}, {:.4g}, {:.4g} pixels of the views (ORIGIN), and the region at {}, "
+      "{}, 0: give the --roi that it was made with, and its whole thickness",
+      path.string(), x_A / series.pixel_size_A, y_A / series.pixel_size_A,
+      z_A / series.pixel_size_A, series.roi.x0, series.roi.y0));
 }
 
 std::vector<int> scored_views(const geometry::TiltGeometry& geometry, int hold_out) {

@@ -172,6 +172,14 @@ std::optional<std::array<double, 3>> place_A(const io::MrcReader& volume) {
   return is_ours && !is_turned(volume) ? std::optional(volume.header().origin_A) : std::nullopt;
 }
 
+bool lies_at(const std::array<double, 3>& place_A, const Rectangle& region, double pixel_size_A) {
+  constexpr double kSamePlace_px = 0.5;
+  const std::array<std::int64_t, 3> corner{region.x0, region.y0, 0};
+  return std::ranges::equal(place_A, corner, [&](double at_A, std::int64_t at_px) {
+    return std::fabs(at_A / pixel_size_A - static_cast<double>(at_px)) < kSamePlace_px;
+  });
+}
+
 void require_whole(const std::filesystem::path& path) {
   const io::MrcReader volume(path);
   const auto place = place_A(volume);

@@ -7,6 +7,7 @@
 
 #include "base/volume.h"
 #include "evaluate/box.h"
+#include "tomofield/options.h"
 
 namespace tomofield::evaluate {
 
@@ -30,6 +31,9 @@ double common_voxel_size_A(const std::string& first, double first_A, const std::
 /// Returns where the corner of a volume lies in the whole in Å, along its axes, if tomofield wrote
 /// it and did not turn it: its ORIGIN.
 std::optional<std::array<double, 3>> place_A(const io::MrcReader& volume);
+
+/// Tells whether a place is the lower corner of a region, which has pixels of this size.
+bool lies_at(const std::array<double, 3>& place_A, const Rectangle& region, double pixel_size_A);
 
 /// Tells whether tomofield turned a volume before it was sampled.
 bool is_turned(const io::MrcReader& volume);

@@ -18,7 +18,7 @@
 namespace tomofield::measurement {
 namespace {
 
-// What files say of the doses and of the order in which the sections were recorded.
+// Holds what files say of the doses and of the order in which the sections were recorded.
 struct Recording {
   std::filesystem::path file;
   std::optional<Exposures> doses;               // [row]

@@ -307,8 +307,7 @@ void warn_of_labels(const io::ImageStack& stack, bool corrects_ctf, bool correct
         "'{}' went through ctfphaseflip, as its header says, and its views count as not corrected: "
         "give --ctf-phase-flipped",
         stack.name()));
-  // IMOD's mtffilter writes "MTFFILTER: Dose weight filtered".
-  if (corrects_dose && io::is_in_labels(stack.header(), "dose weight"))
+  if (corrects_dose && io::is_dose_weighted(stack.header()))
     base::log_warning(fmt::format(
         "'{}' is weighted by the dose already, as its header says, and its views count as not "
         "weighted: give --dose-weighted",

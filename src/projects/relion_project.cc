@@ -114,7 +114,8 @@ void read_relion_project(Project& project) {
     set_views(project, star, star, "rlnMicrographName", {});
     return;
   }
-  const auto tomograms = io::read_relion_tomograms(star).tomograms;
+  const io::RelionTomograms all = io::read_relion_tomograms(star);
+  const auto& tomograms = all.tomograms;
   const io::RelionTomogram& tomogram = choose_tomogram(tomograms, project.request());
   const fs::path views = io::find_listed_file(tomogram.tilt_series_star, star);
   for (const io::RelionTomogram& other : tomograms) add_table_of(project, other, star);
@@ -126,7 +127,7 @@ void read_relion_project(Project& project) {
   for (const std::string& what : tomogram.not_applied)
     project.warn(fmt::format("'{}', tomogram {}: {}, which is not applied", star.string(),
                              tomogram.name, what));
-  if (tomogram.remark) project.warn(fmt::format("'{}': {}", star.string(), *tomogram.remark));
+  if (all.remark) project.warn(fmt::format("'{}': {}", star.string(), *all.remark));
   if (tomogram.defocus_slope.value_or(1.0) != 1.0)
     project.warn(
         fmt::format("'{}', tomogram {}: _rlnTomoDefocusSlope {} is not applied: the "

@@ -119,8 +119,8 @@ void warn_of_corrections(const io::ImageStack& half, const io::ImageStack& all) 
   };
   warn(io::is_phase_flipped(half.header()), io::is_phase_flipped(all.header()),
        "phase-flipped (ctfphaseflip)");
-  warn(io::is_in_labels(half.header(), "dose weight"),
-       io::is_in_labels(all.header(), "dose weight"), "weighted by the dose");
+  warn(io::is_dose_weighted(half.header()), io::is_dose_weighted(all.header()),
+       "weighted by the dose");
 }
 
 }  // namespace

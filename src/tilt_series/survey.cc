@@ -118,7 +118,7 @@ class Surveyor {
       if (aligned_) aligned_->write(view, decoded.aligned);
       checks[view] = check_view(decoded.census, image);
       append_block_means(image, &block_means[view]);
-      if (!options_.take_log && checks[view].has_measurements)
+      if (!options_.take_log && checks[view].has_contrast)
         survey_.noise_sigma[view] = estimate_noise_sigma(image);
     });
     processes_.allreduce_sum(std::span(survey_.noise_sigma));
@@ -137,7 +137,7 @@ class Surveyor {
   // Shares what each process found in its views, and refuses what cannot be used.
   void check(std::vector<ViewCheck> checks) {
     processes_.allreduce_sum(std::span(checks), &ViewCheck::num_not_finite, &ViewCheck::num_bad,
-                             &ViewCheck::is_constant, &ViewCheck::has_measurements);
+                             &ViewCheck::is_constant, &ViewCheck::has_contrast);
     const io::MrcHeader& header = series_.stack().header();
     processes_.run_collectively([&] {
       require_plausible_scale(checks, series_.stack().name(), header.nx * header.ny);

@@ -58,13 +58,18 @@ std::optional<StatedAxis> axis_of_mdoc(const std::filesystem::path& path, const 
       std::remainder(-stated_deg - 90.0, 360.0)));
 }
 
+// Returns the axis that SerialEM's RotationAngle belongs to.
+double axis_of_rotation_deg(const io::AxisAngle& rotation) {
+  return std::remainder(rotation.value - 90.0, 360.0);
+}
+
 [[noreturn]] void refuse_lone_rotation(const std::filesystem::path& path,
                                        const io::AxisAngle& rotation) {
   throw Error(fmt::format(
       "{}: RotationAngle = {}° is stated without a tilt axis, which is {:.4g}° by the rule of "
       "SerialEM: give it with --tilt-axis, or --ignore TiltAxisAngle if the views are aligned "
       "already",
-      line_of(path, rotation), rotation.value, std::remainder(rotation.value - 90.0, 360.0)));
+      line_of(path, rotation), rotation.value, axis_of_rotation_deg(rotation)));
 }
 
 }  // namespace
@@ -73,7 +78,7 @@ std::optional<StatedAxis> axis_of_lone_rotation(const TiltSeriesOptions& options
                                                 const io::Mdoc& mdoc) {
   if (!mdoc.lone_rotation_deg || ignores_axis(options)) return std::nullopt;
   const io::AxisAngle& rotation = *mdoc.lone_rotation_deg;
-  return StatedAxis{std::remainder(rotation.value - 90.0, 360.0),
+  return StatedAxis{axis_of_rotation_deg(rotation),
                     fmt::format("by the rule of SerialEM, RotationAngle = {}° of {}",
                                 rotation.value, line_of(*options.mdoc, rotation))};
 }

@@ -29,10 +29,6 @@ bool has_contrast(const MaskedImage& image) {
 
 }  // namespace
 
-bool has_measurements(const MaskedImage& image) {
-  return std::find(image.valid.begin(), image.valid.end(), 1) != image.valid.end();
-}
-
 ViewCheck check_view(const PixelCensus& census, const MaskedImage& image) {
   return {census.num_not_finite, census.num_bad, census.is_constant, has_contrast(image)};
 }
@@ -73,7 +69,7 @@ void require_usable(const ViewCheck& found, const std::string& name, std::int64_
                     "{:.0e}; leave it out with --exclude {}",
                     name, static_cast<double>(kSmallestDifference), section));
   }
-  if (!found.has_measurements) {
+  if (!found.has_contrast) {
     throw Error(
         fmt::format("{} has no pixel left, or equal ones alone: its alignment moves it out of the "
                     "view, it is flat fill, or --mask is zero all over it; leave it out with "

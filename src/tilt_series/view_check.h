@@ -14,11 +14,8 @@ struct ViewCheck {
   std::int64_t num_not_finite = 0;
   std::int64_t num_bad = 0;
   std::int64_t is_constant = 0;
-  std::int64_t has_measurements = 0;  ///< that differ from each other
+  std::int64_t has_contrast = 0;  ///< two measurements differ
 };
-
-/// Returns true if any pixel is a measurement.
-bool has_measurements(const MaskedImage& image);
 
 ViewCheck check_view(const PixelCensus& census, const MaskedImage& image);
 

@@ -304,13 +304,19 @@ def test_no_result_replaces_an_image_that_a_table_lists(series, plain):
         assert said.returncode == 2 and "would replace the input" in said.stderr, said.stderr
 
 
+def edit_xml(path, old, new):
+    """Replaces a part of Warp's XML, which it must have."""
+    with open(path, encoding="utf-16") as file:
+        text = file.read()
+    assert old in text, (old, text)
+    with open(path, "w", encoding="utf-16") as file:
+        file.write(text.replace(old, new))
+
+
 def test_the_pixel_size_of_warp_counts_where_its_averages_have_none(series):
     folder = harness.fresh_directory("warp_pixels")
     _, xml = star_projects.write_warp(folder, series)
-    with open(xml, encoding="utf-16") as file:
-        text = file.read()
-    with open(xml, "w", encoding="utf-16") as file:
-        file.write(text.replace("</TiltSeries>", '<CTF><Param Name="PixelSize" Value="5" /></CTF></TiltSeries>'))
+    edit_xml(xml, "</TiltSeries>", '<CTF><Param Name="PixelSize" Value="5" /></CTF></TiltSeries>')
     assert "--pixel-size" not in harness.succeed("info", xml, cwd=folder).stdout
     averages = os.path.join(folder, "warp_frameseries/average")
     for name in os.listdir(averages):
@@ -325,11 +331,8 @@ def test_the_microscope_of_a_project_counts_beside_a_given_defocus(series):
     folder = harness.fresh_directory("microscope")
     star = star_projects.write_relion(folder, series)
     _, xml = star_projects.write_warp(folder, series)
-    with open(xml, encoding="utf-16") as file:
-        text = file.read()
-    with open(xml, "w", encoding="utf-16") as file:
-        file.write(text.replace("</TiltSeries>", '<CTF><Param Name="Voltage" Value="200" /><Param Name="Cs" '
-                                'Value="1.4" /><Param Name="Amplitude" Value="0.1" /></CTF></TiltSeries>'))
+    edit_xml(xml, "</TiltSeries>", '<CTF><Param Name="Voltage" Value="200" /><Param Name="Cs" '
+             'Value="1.4" /><Param Name="Amplitude" Value="0.1" /></CTF></TiltSeries>')
     wanted = {xml: ("--voltage 200", "--cs 1.4", "--amplitude-contrast 0.1")}
     with open(star, encoding="utf-8") as file:
         text = file.read()
@@ -347,10 +350,7 @@ def test_an_alignment_beside_a_table_of_views(series):
     """The views that the table leaves out stay so, and a contradiction is said."""
     folder = harness.fresh_directory("replaced")
     _, xml = star_projects.write_warp(folder, series)
-    with open(xml, encoding="utf-16") as file:
-        text = file.read()
-    with open(xml, "w", encoding="utf-16") as file:
-        file.write(text.replace("<UseTilt>True\nTrue", "<UseTilt>True\nFalse"))
+    edit_xml(xml, "<UseTilt>True\nTrue", "<UseTilt>True\nFalse")
     transforms = os.path.join(folder, "a.xf")
     with open(transforms, "w", encoding="utf-8") as file:
         file.write("0 -1 1 0 0 0\n" * len(TILTS))

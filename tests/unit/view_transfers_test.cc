@@ -178,6 +178,13 @@ std::string table_of(const std::vector<std::string>& images) {
   return text;
 }
 
+// Returns the names of some sections of a stack.
+std::vector<std::string> sections_of(const std::string& stack, const std::vector<int>& numbers) {
+  std::vector<std::string> names;
+  for (const int number : numbers) names.push_back(fmt::format("{:06d}@{}", number, stack));
+  return names;
+}
+
 TEST(ViewTransfers, RowsAreThoseOfTheImagesThatTheyName) {
   const ScratchDirectory folder;
   simulate::SimulationOptions simulated = simulation();
@@ -195,15 +202,10 @@ TEST(ViewTransfers, RowsAreThoseOfTheImagesThatTheyName) {
     return found;
   };
   const std::vector<double> in_order{1, 2, 3, 4, 5}, reversed{5, 4, 3, 2, 1};
-  const auto names = [](const std::string& stack, const std::vector<int>& numbers) {
-    std::vector<std::string> all;
-    for (const int number : numbers) all.push_back(fmt::format("{:06d}@{}", number, stack));
-    return all;
-  };
-  EXPECT_EQ(defoci_um(table_of(names("a/tilt_series.st", {1, 2, 3, 4, 5}))), in_order);
-  EXPECT_EQ(defoci_um(table_of(names("tilt_series.mrc", {5, 4, 3, 2, 1}))), reversed);
+  EXPECT_EQ(defoci_um(table_of(sections_of("a/tilt_series.st", {1, 2, 3, 4, 5}))), in_order);
+  EXPECT_EQ(defoci_um(table_of(sections_of("tilt_series.mrc", {5, 4, 3, 2, 1}))), reversed);
   EXPECT_EQ(said, "");
-  EXPECT_EQ(defoci_um(table_of(names("TS_07.mrc", {5, 4, 3, 2, 1}))), reversed);
+  EXPECT_EQ(defoci_um(table_of(sections_of("TS_07.mrc", {5, 4, 3, 2, 1}))), reversed);
   expect_parts(said, {"a.star", "other images", "TS_07.mrc", "by the numbers"});
   EXPECT_EQ(defoci_um(table_of({"a.mrc", "b.mrc", "c.mrc", "d.mrc", "e.mrc"})), in_order);
   expect_parts(said, {"a.star", "other images", "a.mrc", "in their order"});
@@ -213,9 +215,7 @@ TEST(ViewTransfers, DosesOfATableForTheContrastTransferCount) {
   const ScratchDirectory folder;
   simulate::simulate_series(folder / "s", simulation(), false);
   SeriesFiles files = files_in(folder);
-  std::vector<std::string> images;
-  for (const int number : {3, 2, 4, 1, 5}) images.push_back(fmt::format("{}@tilt_series", number));
-  files.ctf = folder.write("a.star", table_of(images));
+  files.ctf = folder.write("a.star", table_of(sections_of("tilt_series", {3, 2, 4, 1, 5})));
   const auto exposures = [&](const Options& options) {
     std::vector<double> found;
     for (const ViewTransfer& transfer : transfers_of(files, options))
@@ -234,9 +234,7 @@ TEST(ViewTransfers, AnMdocWithoutDosesHidesNoOthers) {
   const ScratchDirectory folder;
   simulate::simulate_series(folder / "s", simulation(), false);
   SeriesFiles files = files_in(folder);
-  std::vector<std::string> images;
-  for (const int number : {3, 2, 4, 1, 5}) images.push_back(fmt::format("{}@tilt_series", number));
-  files.ctf = folder.write("a.star", table_of(images));
+  files.ctf = folder.write("a.star", table_of(sections_of("tilt_series", {3, 2, 4, 1, 5})));
   std::string sections = "Voltage = 200\n";
   for (int i = 0; i < 5; ++i)
     sections += fmt::format("[ZValue = {}]\nTiltAngle = {}\n", i, 40 - 20 * i);

@@ -455,6 +455,8 @@ bool is_phase_flipped(const MrcHeader& header) {
   return header.is_ctf_corrected || is_in_labels(header, "ctfphaseflip");
 }
 
+bool is_dose_weighted(const MrcHeader& header) { return is_in_labels(header, "dose weight"); }
+
 bool is_in_labels(const MrcHeader& header, std::string_view word) {
   return std::ranges::any_of(header.labels, [&](std::string label) {
     std::ranges::transform(label, label.begin(),

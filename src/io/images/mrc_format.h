@@ -105,6 +105,10 @@ inline constexpr const char* kLabelOfTurnedBox = "turned: ORIGIN is not its plac
 /// Tells whether a stack went through IMOD's ctfphaseflip, by its labels or IMOD's flag.
 bool is_phase_flipped(const MrcHeader& header);
 
+/// Tells whether a stack is weighted by the dose, by its labels: IMOD's mtffilter writes
+/// "MTFFILTER: Dose weight filtered".
+bool is_dose_weighted(const MrcHeader& header);
+
 /// Says of a file, as the rest of a sentence, that its header states values that its mode cannot
 /// hold: programs have written unsigned numbers as signed ones, and the other way round. Returns
 /// nothing if it does not.

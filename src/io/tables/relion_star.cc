@@ -254,7 +254,8 @@ RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
                     path.string()));
   }
   require_one_table(path, tables, *table);
-  RelionTomograms all{*table, {}};
+  RelionTomograms all{
+      *table, {}, remark_on_unknown(unknown_columns(*table, known_tomogram_columns()))};
   for (std::size_t i = 0; i < table->num_rows(); ++i) {
     const StarRow row(path, *table, i);
     RelionTomogram tomogram;
@@ -267,7 +268,6 @@ RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
     tomogram.optics = optics_by([&](const char* column) { return row.find_number(column); });
     tomogram.mtf = row.find_text("rlnMtfFileName").value_or("");
     tomogram.not_applied = distortions_of({table, 1}, i);
-    tomogram.remark = remark_on_unknown(unknown_columns(*table, known_tomogram_columns()));
     tomogram.size_px = size_of(row, where);
     all.tomograms.push_back(std::move(tomogram));
   }

@@ -23,13 +23,13 @@ struct RelionTomogram {
   std::string mtf;  ///< the file of the detector's transfer function, or empty
   std::optional<std::array<std::int64_t, 3>> size_px;  ///< unbinned
   std::vector<std::string> not_applied{};  ///< distortions that its row states, for messages
-  std::optional<std::string> remark{};     ///< names columns that are not known
 };
 
 /// A tomograms.star, or a STAR file of tilt series that has the same table without volumes.
 struct RelionTomograms {
   StarTable table;  ///< with all columns
   std::vector<RelionTomogram> tomograms;
+  std::optional<std::string> remark{};  ///< names columns that are not known
 };
 
 /// Returns true if a STAR file lists tomograms; one of a single tilt series lists views. Throws

@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kNumOfTomograms = 2;  // columns that a table of tomograms alone has
 constexpr std::array<std::string_view, 69> kKnown{
     "rlnTomoDefocusSlope", "rlnMtfFileName",
-    // Those that relion_star.cc reads, of the tables of views, of tomograms and of optics.
+    // relion_star.cc reads these columns of the tables of views, of tomograms and of optics.
     "rlnMicrographName", "rlnMicrographNameEven", "rlnMicrographNameOdd",
     "rlnTomoNominalStageTiltAngle", "rlnTomoNominalTiltAxisAngle", "rlnTomoXTilt", "rlnTomoYTilt",
     "rlnTomoZRot", "rlnTomoXShiftAngst", "rlnTomoYShiftAngst", "rlnMicrographPreExposure",
@@ -25,7 +25,7 @@ constexpr std::array<std::string_view, 69> kKnown{
     "rlnTomoTiltSeriesStarFile", "rlnTomoHand", "rlnTomoSizeX", "rlnTomoSizeY", "rlnTomoSizeZ",
     "rlnTomoDeformationCoefficients", "rlnMagMat00", "rlnMagMat01", "rlnMagMat10", "rlnMagMat11",
     "rlnBeamTiltX", "rlnBeamTiltY", "rlnOddZernike", "rlnEvenZernike",
-    // Names, what was aimed at, how well it was fitted, and other results.
+    // These columns hold names, targets, qualities of fits, and other results.
     "rlnMicrographMovieName", "rlnMicrographMetadata", "rlnMicrographOriginalPixelSize",
     "rlnMicrographBinning", "rlnMicrographGainName", "rlnMicrographDefectFile", "rlnMicrographId",
     "rlnTomoTiltMovieFrameCount", "rlnTomoTiltMovieIndex", "rlnTomoFrameCount",

@@ -301,7 +301,6 @@ TEST(RelionTomograms, NameColumnsThatAreNotKnown) {
                    "tomograms.star",
                    "data_global\nloop_\n_rlnTomoName #1\n_rlnTomoTiltSeriesStarFile #2\n" + column +
                        " #3\nTS_01 a.star 7\n"))
-        .tomograms[0]
         .remark;
   };
   EXPECT_FALSE(read("_rlnTomoTomogramBinning"));

@@ -11,7 +11,7 @@
 namespace tomofield::io {
 namespace {
 
-// Those that are read, and what Warp measured of the images.
+// The first six columns are read. The others hold what Warp measured of the images.
 constexpr std::array<std::string_view, 8> kKnownColumns{
     "wrpMovieName",   "wrpAngleTilt", "wrpAxisAngle",        "wrpAxisOffsetX",
     "wrpAxisOffsetY", "wrpDose",      "wrpAverageIntensity", "wrpMaskedFraction"};

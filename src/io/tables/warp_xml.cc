@@ -222,7 +222,7 @@ class WarpXml {
   }
 
  private:
-  // Those that are read, and what Warp keeps of its own fits and choices (TiltSeries.cs, SaveMeta).
+  // These are read, or hold what Warp keeps of its own fits and choices (TiltSeries.cs, SaveMeta).
   static constexpr std::array<std::string_view, 13> kKnownAttributes{"AreAnglesInverted",
                                                                      "LevelAngleX",
                                                                      "LevelAngleY",
