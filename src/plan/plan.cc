@@ -171,15 +171,14 @@ RunPlan plan_run(const tilt_series::PlannedSeries& series, const options::Recons
 }
 
 void require_memory(const RunPlan& plan, const distributed::Communicator& processes) {
-  base::require_memory(
-      plan.memory_bytes * static_cast<std::size_t>(processes.size_on_machine()),
-      "this reconstruction",
-      plan.has_large_leaves
-          ? "use a smaller --leaf-size: leaves are larger than the region, and "
-            "take the memory of their whole area"
-          : "use a larger --bin or --vertex-spacing, a smaller --roi or "
-            "--thickness, fewer --threads, or --budget, which fits tiles and makes "
-            "them compact");
+  const std::string advice = fmt::format(
+      "use {}a larger --bin or --vertex-spacing, a smaller --roi or --thickness, fewer --threads, "
+      "or --budget, which fits tiles and makes them compact",
+      plan.has_large_leaves ? "a smaller --leaf-size, since leaves are larger than the region and "
+                              "take the memory of their whole area, "
+                            : "");
+  base::require_memory(plan.memory_bytes * static_cast<std::size_t>(processes.size_on_machine()),
+                       "this reconstruction", advice.c_str());
 }
 
 RunPlan require_possible_run(const tilt_series::PlannedSeries& series,
