@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "base/threads/fork_safe_mutex.h"
 #include "base/threads/stoppable_loops.h"
 
 namespace tomofield::python {
@@ -24,8 +25,8 @@ namespace py = pybind11;
 
 // All calls of this module that are in C++.
 struct Calls {
-  std::mutex mutex;
-  std::condition_variable has_changed;
+  base::ForkSafeMutex mutex;
+  std::condition_variable_any has_changed;
   int count = 0;                       // guarded by the mutex, as are the next ones
   int in_user_code = 0;                // of these calls
   bool is_over = false;                // the interpreter ends

@@ -3,9 +3,11 @@
 #include <mutex>
 #include <utility>
 
+#include "base/threads/fork_safe_mutex.h"
+
 namespace tomofield::base {
 namespace {
-std::mutex g_mutex;
+ForkSafeMutex g_mutex;
 std::function<void(LogLevel, std::string_view)> g_sink;
 HeldLog* g_holder = nullptr;  // the innermost one
 }  // namespace

@@ -91,9 +91,6 @@ void copy_kept(const field::Field& field, std::span<const float> from, std::span
   });
 }
 
-// The tree may change in the coarse stage. Without one, it may change in this part of the fit.
-constexpr double kOpenPart = 0.4;
-
 TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
                               const FitOptions& options, const Stage& first) {
   if (field.tree == TreeKind::kUniform) return {};
@@ -101,8 +98,7 @@ TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
   const auto num_leaves = std::accumulate(levels.begin(), levels.end(), std::int64_t{0});
   return {std::max(field.leaf_size / 2, static_cast<int>(kernels::kLanes)),
           field.leaf_budget > 0 ? field.leaf_budget : static_cast<int>(num_leaves),
-          first.bin > 1 ? first.epochs - 1 : static_cast<std::int64_t>(kOpenPart * first.epochs),
-          options.seed};
+          open_epochs(field, first), options.seed};
 }
 
 }  // namespace

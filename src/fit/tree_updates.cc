@@ -72,6 +72,17 @@ void apply_edit(const field::QuadtreeEdit& edit, field::Field& field, Adam::Stat
   optimizer.leaf_steps = std::move(steps);
 }
 
+std::int64_t open_epochs(const FieldOptions& field, const Stage& first) {
+  // The tree may change in the coarse stage. Without one, it may change in this part of the fit.
+  constexpr double kOpenPart = 0.4;
+  if (field.tree == TreeKind::kUniform) return 0;
+  return first.bin > 1 ? first.epochs - 1 : static_cast<std::int64_t>(kOpenPart * first.epochs);
+}
+
+bool tree_may_change(const FieldOptions& field, const Stage& first) {
+  return open_epochs(field, first) >= kEpochsBetweenUpdates;
+}
+
 TreeUpdates::TreeUpdates(int min_size, int budget, std::int64_t open_epochs, std::uint64_t seed)
     : min_size_(min_size), budget_(budget), open_epochs_(open_epochs), seed_(seed) {}
 

@@ -5,6 +5,8 @@
 
 #include "field/field.h"
 #include "fit/adam.h"
+#include "fit/stages.h"
+#include "tomofield/options.h"
 
 namespace tomofield::fit {
 
@@ -33,6 +35,11 @@ std::vector<double> leaf_errors(const field::Field& field, std::uint64_t seed, s
 /// leaves. A quarter takes over the number of steps of the leaf that was split. A merged leaf takes
 /// the smallest number of the four, so that its bias correction is the most careful one.
 void apply_edit(const field::QuadtreeEdit& edit, field::Field& field, Adam::State& optimizer);
+
+/// Returns after how many epochs a tree changes no more, in a fit that begins with stage `first`.
+std::int64_t open_epochs(const FieldOptions& field, const Stage& first);
+/// Tells whether the tree may change in such a fit.
+bool tree_may_change(const FieldOptions& field, const Stage& first);
 
 /// Updates an adaptive tree (Martel et al. 2021, ACORN). While the tree is open, every other epoch
 /// ends with an update: it measures the leaves' errors, plans splits and merges (plan_update.h) and

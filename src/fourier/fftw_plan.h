@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "base/check.h"
+#include "base/threads/fork_safe_mutex.h"
 
 namespace tomofield::fourier {
 
@@ -29,8 +30,8 @@ class FftwPlan {
   fftwf_plan get() const { return plan_; }
 
  private:
-  static std::mutex& one_at_a_time() {
-    static std::mutex mutex;
+  static base::ForkSafeMutex& one_at_a_time() {
+    static base::ForkSafeMutex mutex;
     return mutex;
   }
 

@@ -9,6 +9,7 @@
 namespace tomofield::objective {
 namespace {
 
+using geometry::Extent2;
 using geometry::RayBundle;
 using projection::Ray;
 
@@ -33,6 +34,40 @@ int samples_per_diagonal(const FitOptions& options, const field::Quadtree& tree,
   return static_cast<int>(std::ceil(std::hypot(size, size, thickness)));
 }
 
+Extent2 extent_of(const Rectangle& roi) {
+  return {static_cast<double>(roi.x0), static_cast<double>(roi.y0), static_cast<double>(roi.x1),
+          static_cast<double>(roi.y1)};
+}
+
+// Estimates the bytes of what is kept of traced rays.
+class TraceBytes {
+ public:
+  TraceBytes(const field::Quadtree& tree, double thickness, const RayRegion& region,
+             const FitOptions& options)
+      : region_(region),
+        thickness_(thickness),
+        leaf_size_(smallest_leaf(tree)),
+        samples_a_pixel_(samples_per_diagonal(options, tree, thickness) /
+                         std::hypot(leaf_size_, leaf_size_, thickness)) {}
+
+  // Returns the bytes of the ray through a place of a view; 0 if it misses the region.
+  double of_ray(const RayBundle& view, double u, double v) const {
+    constexpr double kBytesPerPiece = 128, kBytesPerSample = 4, kPadding = 16;
+    const RayBundle::Line line = view.line(u, v);
+    if (clip(line, extent_of(region_.roi), {0.0, thickness_}).empty()) return 0.0;
+    const geometry::HeightRange within = clip(line, region_.support, {0.0, thickness_});
+    const double height = within.high - within.low;
+    const double pieces =
+        1 + height * (std::abs(line.x_per_z) + std::abs(line.y_per_z)) / leaf_size_;
+    const double samples = height * view.length_per_z * samples_a_pixel_ + kPadding * pieces;
+    return pieces * kBytesPerPiece + samples * kBytesPerSample;
+  }
+
+ private:
+  const RayRegion& region_;
+  double thickness_, leaf_size_, samples_a_pixel_;
+};
+
 std::uint32_t draw_of(std::uint64_t seed, std::uint64_t stream) {
   return static_cast<std::uint32_t>(base::Random(seed, stream).bits() >> 32);
 }
@@ -43,8 +78,7 @@ RayDataTerm::RayDataTerm(const geometry::RayGeometry& geometry,
                          const measurement::SlabViews& measured, const field::Field& field,
                          const RayRegion& region, const FitOptions& options)
     : measured_(measured),
-      roi_{static_cast<double>(region.roi.x0), static_cast<double>(region.roi.y0),
-           static_cast<double>(region.roi.x1), static_cast<double>(region.roi.y1)},
+      roi_(extent_of(region.roi)),
       thickness_(field.thickness()),
       roots_(field.tree().roots()),
       seed_(options.seed),
@@ -55,23 +89,29 @@ RayDataTerm::RayDataTerm(const geometry::RayGeometry& geometry,
 }
 
 std::size_t RayDataTerm::working_memory(const geometry::RayGeometry& geometry,
-                                        const field::Quadtree& tree, const FitOptions& options,
+                                        const field::Quadtree& tree, const RayRegion& region,
+                                        const FitOptions& options,
                                         const measurement::SlabViews::Shape& shape) {
-  constexpr double kBytesPerPiece = 128, kBytesPerSample = 4, kPadding = 16, kBytesPerRay = 40;
-  const double thickness = geometry.aligned.thickness, size = smallest_leaf(tree);
-  const double per_pixel =
-      samples_per_diagonal(options, tree, thickness) / std::hypot(size, size, thickness);
-  double bytes_of_ray = 0;  // mean over the views
+  constexpr double kBytesPerRay = 40;
+  constexpr int kAcross = 32;  // rays along each side of a view that stand for the others
+  constexpr double kPart = 1.0 / kAcross;
+  const TraceBytes trace(tree, geometry.aligned.thickness, region, options);
+  const auto width = static_cast<double>(shape.width),
+             num_rows = static_cast<double>(shape.num_rows);
+  double num_met = 0, bytes = 0;
   for (int view = 0; view < geometry.num_views(); ++view) {
     const RayBundle rays = geometry.rays(view);
-    const double pieces = 1 + thickness * (std::abs(rays.x[3]) + std::abs(rays.y[3])) / size;
-    const double samples = thickness * rays.length_per_z * per_pixel + kPadding * pieces;
-    bytes_of_ray += (pieces * kBytesPerPiece + samples * kBytesPerSample) / geometry.num_views();
+    for (int i = 0; i < kAcross * kAcross; ++i) {
+      const double of_ray = trace.of_ray(rays, (i % kAcross + 0.5) * kPart * width,
+                                         (i / kAcross + 0.5) * kPart * num_rows);
+      num_met += of_ray > 0 ? 1 : 0;
+      bytes += of_ray;
+    }
   }
-  const double num_rays = static_cast<double>(shape.num_views) *
-                          static_cast<double>(shape.width * shape.num_rows) / options.subsets;
+  if (num_met == 0) return 0;
+  const double num_rays = num_met * kPart * kPart * width * num_rows / options.subsets;
   const double at_once = std::min(num_rays, static_cast<double>(kRaysAtOnce));
-  return static_cast<std::size_t>(num_rays * kBytesPerRay + at_once * bytes_of_ray);
+  return static_cast<std::size_t>(num_rays * kBytesPerRay + at_once * bytes / num_met);
 }
 
 std::vector<Ray> RayDataTerm::batch(std::int64_t step) const {

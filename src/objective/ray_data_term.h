@@ -39,7 +39,8 @@ class RayDataTerm : public Term {
 
   /// Estimates the bytes that a step needs in addition to the parameters.
   static std::size_t working_memory(const geometry::RayGeometry& geometry,
-                                    const field::Quadtree& tree, const FitOptions& options,
+                                    const field::Quadtree& tree, const RayRegion& region,
+                                    const FitOptions& options,
                                     const measurement::SlabViews::Shape& shape);
 
   /// Returns the rays of a step, sorted by the row of root cells that they cross.

@@ -10,6 +10,7 @@
 #include "base/threads/parallel.h"
 #include "field/sampling/sample_box.h"
 #include "output/sample_model.h"
+#include "output/sampling_time.h"
 #include "output/volume.h"
 #include "tomofield/error.h"
 
@@ -106,7 +107,7 @@ std::vector<float> Model::sample(const SampleBox& box) const {
   const base::ThreadsInUse threads;
   const field::OrientedBox oriented = oriented_box(box);
   field::require_memory_of(oriented);
-  output::announce_sampling(impl_->model, oriented);
+  output::announce_sampling(impl_->model, {&oriented, 1});
   auto values = output::sample_box(impl_->model, oriented);
   output::to_output(impl_->model, values);
   return values;

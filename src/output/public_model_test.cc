@@ -2,18 +2,19 @@
 
 #include <cmath>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "base/log.h"
 #include "field/sampling/sample_box.h"
 #include "io/images/mrc.h"
 #include "output/model_file.h"
-#include "output/sample_model.h"
+#include "output/sampling_time.h"
 #include "output/volume.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 #include "tomofield/model.h"
 #include "uneven_model.h"
-#include "warning_catcher.h"
 
 namespace tomofield {
 namespace {
@@ -62,18 +63,46 @@ TEST(PublicModel, RefusesBoxesLargerThanTheMemory) {
       << message;
 }
 
+// Returns what is said of the time that boxes take.
+std::string said_of(const std::vector<field::OrientedBox>& boxes) {
+  std::string said;
+  base::set_log_sink([&](base::LogLevel, std::string_view text) { said += text; });
+  output::announce_sampling(testing::uneven_model(FieldKind::kVm), boxes);
+  base::set_log_sink({});
+  return said;
+}
+
 TEST(PublicModel, SaysHowLongALargeBoxTakes) {
-  const auto model = testing::uneven_model(FieldKind::kVm);
+  field::OrientedBox box{.centre_px = {60, 60, 10},
+                         .size = {100, 100, 100},
+                         .field_from_box = field::rotation_from_euler(10, 20, 30)};
+  EXPECT_EQ(said_of({box}), "");
+  box.size = {10000, 10000, 90000};
+  EXPECT_NE(said_of({box}).find("sampling 10000 × 10000 × 90000 voxels may take about"),
+            std::string::npos);
+}
+
+TEST(PublicModel, CountsTheTimeOfPointsInTheModelAlone) {
+  field::OrientedBox box{.centre_px = {60, 60, 10},
+                         .size = {64, 64, 64},
+                         .voxel_px = 2000,
+                         .field_from_box = field::rotation_from_euler(0, 12, 1)};
+  EXPECT_NE(said_of({box}).find("may take about"), std::string::npos);
+  box.centre_px[0] = -300000;
+  EXPECT_EQ(said_of({box}), "");
+}
+
+TEST(PublicModel, CountsTheTimeOfAllBoxes) {
   const field::OrientedBox box{.centre_px = {60, 60, 10},
-                               .size = {10000, 10000, 90000},
+                               .size = {100, 100, 100},
+                               .voxel_px = 0.1,
                                .field_from_box = field::rotation_from_euler(10, 20, 30)};
-  const testing::WarningCatcher warnings;
-  output::announce_sampling(model, {.centre_px = box.centre_px, .size = {100, 100, 100}});
-  EXPECT_EQ(warnings.text(), "");
-  output::announce_sampling(model, box);
-  EXPECT_NE(warnings.text().find("sampling 10000 × 10000 × 90000 voxels may take about"),
+  std::vector<field::OrientedBox> boxes(200000, box);
+  boxes.front().centre_px[0] = 6000;
+  const std::string said = said_of(boxes);
+  EXPECT_NE(said.find("sampling 200000 times 100 × 100 × 100 voxels may take about"),
             std::string::npos)
-      << warnings.text();
+      << said;
 }
 
 TEST(PublicModel, SamplesPoints) {

@@ -20,10 +20,6 @@ std::size_t usual_decoded_bytes();
 Model load_to_sample(const std::filesystem::path& path,
                      std::size_t most_bytes = usual_decoded_bytes());
 
-/// Says how long it may take to sample `count` boxes of this size, if it is more than some
-/// seconds: a small part of the box is timed. A warning says it of more than ten minutes.
-void announce_sampling(const Model& model, const field::OrientedBox& box, std::size_t count = 1);
-
 /// Computes the densities of a box, whether the model is decoded or not.
 void sample_box(const Model& model, const field::OrientedBox& box, const field::BoxSink& sink);
 /// Does the same and returns them in the order [z, y, x].

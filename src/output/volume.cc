@@ -24,6 +24,7 @@
 #include "output/box_bounds.h"
 #include "output/model_input_record.h"
 #include "output/sample_model.h"
+#include "output/sampling_time.h"
 #include "tomofield/error.h"
 
 namespace tomofield::output {
@@ -219,7 +220,7 @@ void write_volume(const Model& model, const VolumeOptions& options,
   const std::size_t passes = is_integer && !part.largest_density ? 2 : 1;
   bool is_announced = !part.box;  // an export is, once its file can be written
   const auto source = [&](const field::BoxSink& sink) {
-    if (!std::exchange(is_announced, true)) announce_sampling(model, box, passes);
+    if (!std::exchange(is_announced, true)) announce_sampling(model, std::vector(passes, box));
     sample_box(model, box, sink);
   };
   write_voxels(source, box, model, kMadeBy, options, path, distributed::Communicator::alone(),

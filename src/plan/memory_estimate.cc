@@ -14,6 +14,7 @@
 #include "field/vm/factorise.h"
 #include "fit/fit.h"
 #include "fit/halo.h"
+#include "fit/tree_updates.h"
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
 #include "measurement/row_share.h"
@@ -220,13 +221,17 @@ double fitted_bytes(const fit::Domain& domain, const std::vector<fit::Stage>& st
                     const FieldOptions& options, const distributed::Communicator& processes) {
   constexpr double kCopiesThatRaysWrite = 3;  // the gradient and two moments
   constexpr double kCopiesOfChange = 6;       // two of the parameters and of each moment
+  const bool tree_may_change = fit::tree_may_change(options, stages.front());
+  FieldOptions largest_field = options;
+  if (!tree_may_change) largest_field.leaf_budget = 0;
   double largest = 0;
   for (const fit::Stage& s : stages) {
-    const bool may_change = options.tree == TreeKind::kAdaptive && &s == &stages.front();
+    const bool may_change = tree_may_change && &s == &stages.front();
     const double met = part_that_rays_meet(domain, s.field_kind);
     const double copies = may_change ? kCopiesOfChange + met : 1 + kCopiesThatRaysWrite * met;
-    largest = std::max(largest, copies * part_in_stage(domain, s) *
-                                    parameter_bytes(domain, options, s.field_kind, processes));
+    largest =
+        std::max(largest, copies * part_in_stage(domain, s) *
+                              parameter_bytes(domain, largest_field, s.field_kind, processes));
   }
   return largest;
 }
@@ -261,9 +266,10 @@ std::size_t estimate_memory(const PlannedFit& planned, const std::vector<fit::St
                leaves_of_threads(domain)) +  // whose spikes are limited
       static_cast<std::size_t>(base::thread_count()) * thread_memory(plan, domain);
   const std::size_t tracing =
-      plan.ray_geometry ? leaves_of_threads(domain) +
-                              objective::RayDataTerm::working_memory(
-                                  *plan.ray_geometry, domain.tree, options.fit, plan.rays_shape())
+      plan.ray_geometry ? leaves_of_threads(domain) + objective::RayDataTerm::working_memory(
+                                                          *plan.ray_geometry, domain.tree,
+                                                          {plan.roi, domain.support}, options.fit,
+                                                          plan.rays_shape())
                         : 0;
   const std::size_t program = kProgramBytes + (processes.size() > 1 ? kMpi : 0);
   const std::size_t decoding = measurement::decoding_memory(series, plan, processes);

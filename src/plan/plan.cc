@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -69,11 +70,13 @@ std::size_t memory_of_halves(const tilt_series::PlannedSeries& series,
 std::size_t memory_of_trials(const measurement::Measurement& plan,
                              const options::ReconstructOptions& options, int num_trials,
                              const distributed::Communicator& processes) {
-  constexpr int kMostSideBySide = 4;        // tune/automatic_choice.cc
-  constexpr std::int64_t kRowsBeyond = 16;  // tune::search_trial()
-  const tune::TrialShape trial = tune::search_trial(options.field, options.fit);
+  constexpr int kMostSideBySide = 4;  // tune/automatic_choice.cc
+  tune::TrialShape trial = tune::search_trial(options.field, options.fit, plan.geometry.height);
   Rectangle rows = plan.roi;
-  rows.y1 = std::min(rows.y1, rows.y0 + trial.rows + kRowsBeyond);
+  rows.y1 = std::min(rows.y1, rows.y0 + trial.rows);
+  trial.field.leaf_budget =
+      static_cast<int>(std::ceil(trial.field.leaf_budget * static_cast<double>(rows.height()) /
+                                 static_cast<double>(plan.roi.height())));
   const fit::Domain domain = fit::make_domain(plan.geometry, rows, trial.field);
   const double of_trial = fitted_bytes(domain, fit::make_stages(trial.field, trial.fit),
                                        trial.field, distributed::Communicator::alone());

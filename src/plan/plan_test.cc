@@ -168,6 +168,26 @@ TEST_F(Plan, CountsTheLeavesThatTheRayEngineCopies) {
   EXPECT_GE(run.memory_bytes, 22 * run.num_parameters);
 }
 
+TEST_F(Plan, CountsTheRaysThatMeetTheRegionAlone) {
+  options_.fit.engine = Engine::kRay;
+  options_.fit.ray_samples = 100000;
+  const std::size_t whole = plan().memory_bytes;
+  options_.specimen.roi = Rectangle{24, 16, 40, 32};
+  // A third of the rows, and less than a half of their rays.
+  EXPECT_LT(plan().memory_bytes, whole / 6);
+}
+
+TEST_F(Plan, CountsCopiesOfATreeThatChangesAlone) {
+  options_.field.kind = FieldKind::kVm;
+  options_.field.rank = 300;
+  options_.field.tree = TreeKind::kAdaptive;
+  options_.fit.prior = Prior::kTv;
+  options_.fit.spike_rank = 3;
+  const std::size_t changing = plan().memory_bytes;
+  options_.fit.epochs = 4;
+  EXPECT_LT(plan().memory_bytes, changing - 8 * plan().num_parameters);
+}
+
 TEST_F(Plan, RefusesWhatTheMachineCannotHold) {
   RunPlan run = plan();
   EXPECT_NO_THROW(require_memory(run));

@@ -61,6 +61,17 @@ measurement::Measurement prepare(const tilt_series::TiltSeries& series,
   return measurement;
 }
 
+// Removes the model and the trials of an earlier run once this one stores an alignment or trials:
+// if it is resumed, it must not take them for its own.
+void forget_old_progress(const options::ReconstructOptions& options,
+                         const distributed::Communicator& processes) {
+  if (options.run.output.empty() || options.run.resume || !processes.is_root()) return;
+  const output::OutputPaths paths = output::output_paths(options.run.output);
+  std::error_code ignored;
+  std::filesystem::remove(paths.model, ignored);
+  if (options.fit.tune) std::filesystem::remove(paths.trials, ignored);
+}
+
 // Makes the trials and chooses settings by them. Returns nothing if a stop was requested.
 std::optional<tune::TunedFit> choose_by_trials(const Run& run, const tune::OpenSettings& open) {
   const options::ReconstructOptions& options = run.options;
@@ -71,6 +82,7 @@ std::optional<tune::TunedFit> choose_by_trials(const Run& run, const tune::OpenS
     const std::string fingerprint =
         checkpoint::fingerprint_of(options, run.measurement, run.processes);
     const std::filesystem::path path = run.writes_files() ? run.paths.trials : "";
+    forget_old_progress(options, run.processes);
     run.processes.run_collectively([&] { file.emplace(path, fingerprint, options.run.resume); });
   }
   return tune::choose_settings(run.measurement, options.field, options.fit, open,
@@ -172,6 +184,15 @@ bool align_views(options::ReconstructOptions& options, const Observer& observer,
       processes);
 }
 
+// Aligns the views before a fit, if the options ask for it. Returns false if a stop was requested.
+bool align_for_fit(options::ReconstructOptions& options, const Observer& observer,
+                   const distributed::Communicator& processes) {
+  if (options.run.align == Alignment::kOff) return true;
+  if (!align_views(options, observer, processes)) return false;
+  forget_old_progress(options, processes);
+  return true;
+}
+
 // Notes the tilt axis by which views are turned because a file states it.
 void note_axis(const tilt_series::PlannedSeries& series, options::ReconstructOptions& options) {
   const auto& axis = series.stated_axis();
@@ -261,7 +282,7 @@ RunResult run(options::ReconstructOptions options, const Observer& observer,
               const distributed::Communicator& processes) {
   const std::vector<io::OutputLock> locks = claim(options, processes);
   plan::check_before_reading(options, processes);
-  if (!align_views(options, observer, processes)) return {.outcome = Outcome::kStoppedAligning};
+  if (!align_for_fit(options, observer, processes)) return {.outcome = Outcome::kStoppedAligning};
   const tilt_series::TiltSeries series(options.input(), processes);
   const plan::RunPlan plan = make_plan(series, options, observer, processes);
   note_axis(series, options);
@@ -291,7 +312,7 @@ bool choose(const std::filesystem::path& file, options::ReconstructOptions optio
             const Observer& observer, const distributed::Communicator& processes) {
   const std::vector<io::OutputLock> locks = claim(options, processes);
   plan::check_before_reading(options, processes);
-  if (!align_views(options, observer, processes)) return false;
+  if (!align_for_fit(options, observer, processes)) return false;
   const tilt_series::TiltSeries series(options.input(), processes);
   make_plan(series, options, observer, processes);
   Run run = begin_run(series, std::move(options), observer, processes);

@@ -258,6 +258,9 @@ def test_dry_run_writes_nothing_and_knows_the_memory(check_memory):
     check_memory("--rank", 256)
     # Plain vertices need most memory, in the first two stages.
     check_memory("--rank", 2, "--vertex-spacing", 0.25, "--vertex-epochs", 1)
+    # A tree that is fitted for one epoch does not change.
+    check_memory("--rank", 160, "--tree", "adaptive")
+    check_memory("--field", "grid", "--engine", "ray", "--ray-samples", 8000)
 
 
 @pytest.fixture(scope="module", name="check_memory")

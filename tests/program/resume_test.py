@@ -261,6 +261,24 @@ def test_a_run_that_is_stopped_after_its_alignment_is_told_how_to_go_on():
     assert run.returncode == 130 and "and --resume" in errors, errors
 
 
+@pytest.mark.parametrize("stored, options", (("_align.json", ["--align", "refine"]), ("_tune.json", ["--tune"])))
+def test_a_run_over_older_results_goes_on_from_what_it_stored_before_its_first_checkpoint(stored, options):
+    """The older model has other options, and must not count as a checkpoint."""
+    series = harness.Series("older")
+    output = os.path.join(series.directory, "older.mrc")
+    command = ["reconstruct", *series.input, "--thickness", harness.THICKNESS, "--contrast", "bright",
+               "--bead-diameter", 0, "--prior", "tv", "-o", output, *options]
+    harness.succeed(*command, "--epochs", 1, "--rank", 2)
+    prefix = output.removesuffix(".mrc")
+    old = read_bytes(prefix + stored)
+    run = harness.start(*command, "--epochs", 30, "--view-scale", "off", "--seed", 7, "--overwrite")
+    assert wait_for(lambda: os.path.exists(prefix + stored) and read_bytes(prefix + stored) != old, run)
+    run.send_signal(signal.SIGINT)
+    _, errors = run.communicate(timeout=60)
+    assert run.returncode == 130 and "--resume instead of --overwrite" in errors, errors
+    harness.succeed(*command, "--epochs", 30, "--view-scale", "off", "--seed", 7, "--resume")
+
+
 def test_resume_of_a_finished_run_writes_the_same_results(command, undisturbed):
     results = harness.fresh_results("finished")
     harness.succeed(*command(results))

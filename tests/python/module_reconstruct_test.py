@@ -445,6 +445,43 @@ else:
     assert said in ended.stdout and (said or ended.stdout == "status 5\n"), ended.stdout
 
 
+def test_processes_that_are_forked_beside_a_reconstruction_sample(tmp_path):
+    """Its threads hold locks for moments at which some of these processes begin."""
+    script = f"""
+import os, sys, threading, time
+import numpy as np
+import tomofield
+views = np.random.default_rng(1).normal(100, 10, (21, 32, 32)).astype(np.float32)
+options = dict(thickness=16, contrast="bright", pixel_size_A=10, density_variation=1.0, prior="tv",
+               coarse_epochs=0, fit_view_scale=False, black_level=0.0, bead_diameter_nm=0.0,
+               spike_rank=0)
+model = tomofield.reconstruct(views, np.linspace(-60, 60, 21), epochs=1, **options).model
+def reconstruct():
+    while True:
+        tomofield.reconstruct(views, np.linspace(-60, 60, 21), epochs=2, **options)
+threading.Thread(target=reconstruct, daemon=True).start()
+for number in range(60):
+    child = os.fork()
+    if child == 0:
+        model.sample(tomofield.Box((16, 16, 8), (8, 8, 8)))
+        os._exit(5)
+    for _ in range(1000):
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            break
+        time.sleep(0.01)
+    if not ended or os.waitstatus_to_exitcode(status) != 5:
+        print(f"process {{number}} hangs or failed", flush=True)
+        os.kill(child, 9)
+        os._exit(1)
+os._exit(0)
+"""
+    module = os.path.dirname(os.path.dirname(tomofield.__file__))
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path,
+                           env={**os.environ, "PYTHONPATH": module}, timeout=300, check=False)
+    assert ended.returncode == 0, (ended.stdout, ended.stderr)
+
+
 def test_a_process_that_is_forked_after_a_reconstruction_reconstructs(series, quick):
     tomofield.reconstruct(series.views, series.tilt_deg, **quick)
     child = multiprocessing.get_context("fork").Process(

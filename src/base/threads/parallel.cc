@@ -15,6 +15,7 @@
 
 #include "base/progress.h"
 #include "base/system/processors.h"
+#include "base/threads/fork_safe_mutex.h"
 #include "base/threads/stoppable_loops.h"
 #include "base/threads/worker_threads.h"
 #include "base/trace.h"
@@ -172,7 +173,7 @@ Users& users() {
 }
 
 Threads& threads() {
-  static std::mutex mutex;
+  static ForkSafeMutex mutex;
   const std::lock_guard lock(mutex);
   OwnThreads& current = current_threads();
   if (!current || current.get_deleter().process != getpid())

@@ -13,6 +13,7 @@
 #include "output/box_bounds.h"
 #include "output/model_input_record.h"
 #include "output/sample_model.h"
+#include "output/sampling_time.h"
 #include "output/volume.h"
 #include "tomofield/error.h"
 
@@ -97,7 +98,7 @@ std::size_t write_particles(const output::Model& model, ParticleList list,
                                   spec.labels.front());
   }
   io::MrcWriter file(stack, spec);
-  output::announce_sampling(model, places.front(), places.size());
+  output::announce_sampling(model, places);
   const output::BoxBounds region = output::region_bounds(model);
   std::size_t num_cut = 0;
   for (std::size_t p = 0; p < places.size(); ++p) {

@@ -80,6 +80,34 @@ void sample_aligned(const Field& field, const OrientedBox& box, base::Range some
   });
 }
 
+// Says of the voxels of a box whether they lie beside a field.
+class BesideField {
+ public:
+  BesideField(const Field& field, const OrientedBox& box)
+      : box_(box), reach_px_(std::numbers::sqrt3 / 2 * box.voxel_px) {
+    const RootGrid& roots = field.tree().roots();
+    low_ = {static_cast<double>(roots.x0), static_cast<double>(roots.y0), 0.0};
+    const auto side = static_cast<double>(roots.cell_size);
+    high_ = {low_[0] + roots.columns * side, low_[1] + roots.rows * side, field.thickness()};
+    for (const std::size_t a : {0, 1}) {
+      low_[a] += kPixelCentre;
+      high_[a] += kPixelCentre;
+    }
+  }
+  bool operator()(std::int64_t x, std::int64_t y, std::int64_t z) const {
+    const Point middle = box_.position(
+        {static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5, static_cast<double>(z) + 0.5});
+    for (std::size_t a = 0; a < 3; ++a)
+      if (middle[a] < low_[a] - reach_px_ || middle[a] > high_[a] + reach_px_) return true;
+    return false;
+  }
+
+ private:
+  const OrientedBox& box_;
+  double reach_px_;  // from the middle of a voxel to its corners
+  Point low_{}, high_{};
+};
+
 // Returns the mean density of a voxel's points.
 double voxel_density(const Field& field, const OrientedBox& box, std::int64_t x, std::int64_t y,
                      std::int64_t z) {
@@ -90,6 +118,7 @@ double voxel_density(const Field& field, const OrientedBox& box, std::int64_t x,
   };
   double sum = 0.0;
   for (std::int64_t k = 0; k < factor; ++k) {
+    base::allow_interruption();
     for (std::int64_t j = 0; j < factor; ++j) {
       for (std::int64_t i = 0; i < factor; ++i) {
         const Point at = box.position({along(x, i), along(y, j), along(z, k)});
@@ -104,6 +133,7 @@ void sample_rotated(const Field& field, const OrientedBox& box, base::Range some
                     const BoxSink& sink) {
   const auto [nx, ny, nz] = box.size;
   const std::int64_t blocks = (some.end - some.begin + kBlock - 1) / kBlock;
+  const BesideField is_beside(field, box);
   base::parallel_for("sample rows", nz * blocks, [&, nx = nx](std::int64_t index) {
     const std::int64_t section = index / blocks;
     const std::int64_t first_row = some.begin + index % blocks * kBlock;
@@ -113,7 +143,9 @@ void sample_rotated(const Field& field, const OrientedBox& box, base::Range some
     for (std::int64_t row = first_row; row < first_row + num_rows; ++row) {
       base::allow_interruption();
       for (std::int64_t x = 0; x < nx; ++x)
-        values.push_back(static_cast<float>(voxel_density(field, box, x, row, section)));
+        values.push_back(is_beside(x, row, section)
+                             ? 0.0f
+                             : static_cast<float>(voxel_density(field, box, x, row, section)));
     }
     sink({section, 1, first_row, num_rows, values});
   });

@@ -64,6 +64,32 @@ TEST_P(EachBoxedField, OutsideTheDomainThereIsNothing) {
   EXPECT_GT(values.back(), 0.0f);
 }
 
+// Voxels of one point, most of them beside the domain, and coarse ones that reach into it.
+TEST_P(EachBoxedField, TurnedBoxesAreTheDensity) {
+  const auto model = uneven_model(GetParam());
+  OrientedBox box{.centre_px = {-60, 20, 5},
+                  .size = {20, 21, 22},
+                  .voxel_px = 3,
+                  .field_from_box = rotation_from_euler(10, 70, 30)};
+  OrientedBox points = box;
+  points.voxel_px = 1;
+  for (std::int64_t& side : points.size) side *= 3;
+  const std::vector<double> densities = point_by_point(*model.field, points);
+  testing::expect_near(sample_box(*model.field, points), densities, 3e-6);
+  std::vector<double> means;
+  for (std::int64_t i = 0; i < box.size[0] * box.size[1] * box.size[2]; ++i) {
+    const std::int64_t x = i % box.size[0], y = i / box.size[0] % box.size[1];
+    const std::int64_t z = i / box.size[0] / box.size[1];
+    double sum = 0.0;
+    for (int p = 0; p < 27; ++p)
+      sum += densities[index(points, 3 * x + p % 3, 3 * y + p / 3 % 3, 3 * z + p / 9)];
+    means.push_back(sum / 27);
+  }
+  EXPECT_GT(std::ranges::count(means, 0.0), std::ssize(means) / 2);
+  EXPECT_LT(std::ranges::count(means, 0.0), std::ssize(means));
+  testing::expect_near(sample_box(*model.field, box), means, 3e-6);
+}
+
 // A voxel of f pixels is the mean of f³ voxels of one pixel. A voxel of 2.5 px has three points
 // along each axis.
 TEST_P(EachBoxedField, CoarseVoxelsAreMeansOfFineOnes) {
