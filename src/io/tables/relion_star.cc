@@ -269,6 +269,8 @@ RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
     tomogram.mtf = row.find_text("rlnMtfFileName").value_or("");
     tomogram.not_applied = distortions_of({table, 1}, i);
     tomogram.size_px = size_of(row, where);
+    if (!tomogram.size_px && row.find_number("rlnTomoSizeZ").value_or(0.0) > 0.0)
+      tomogram.not_applied.emplace_back("rlnTomoSizeZ without rlnTomoSizeX and rlnTomoSizeY");
     all.tomograms.push_back(std::move(tomogram));
   }
   if (all.tomograms.empty())

@@ -134,6 +134,17 @@ TEST(RelionTomograms, HaveSizesOfWholePixelsOrNone) {
                  {"tomograms.star", "TS_01", column});
 }
 
+TEST(RelionTomograms, AHeightAloneIsNoted) {
+  const ScratchDirectory scratch;
+  const RelionTomograms all = read_relion_tomograms(scratch.write(
+      "tomograms.star",
+      "data_global\nloop_\n_rlnTomoName #1\n_rlnTomoTiltSeriesStarFile #2\n_rlnTomoSizeZ #3\n"
+      "TS_01 t/TS_01.star 1200\nTS_02 t/TS_02.star 0\n"));
+  ASSERT_EQ(all.tomograms[0].not_applied.size(), 1u);
+  expect_parts(all.tomograms[0].not_applied[0], {"rlnTomoSizeZ", "rlnTomoSizeX"});
+  EXPECT_TRUE(all.tomograms[1].not_applied.empty());
+}
+
 TEST(ViewTable, ADefocusThatIsLeftOutIsNoted) {
   const ScratchDirectory scratch;
   const std::string row = " None 0 -60 85 0 0 3 ";
