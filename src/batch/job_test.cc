@@ -121,6 +121,26 @@ TEST(Jobs, HaveProgressInTilesAndInAnAlignment) {
   }
 }
 
+TEST(Jobs, GoOnFromNewerFilesAlone) {
+  const testing::ScratchDirectory scratch;
+  const auto now = std::filesystem::file_time_type::clock::now();
+  const auto write = [&](const char* name, std::chrono::seconds later) {
+    std::filesystem::last_write_time(scratch.write(name, ""), now + later);
+  };
+  const Job job{.name = "a", .output = scratch / "a.mrc", .replaces = true};
+  write("a.h5", std::chrono::seconds(0));
+  write("a_tiles.h5", std::chrono::seconds(5));
+  const State before{.progress = Progress::kRunning,
+                     .reason = {},
+                     .costs = {},
+                     .old_checkpoint_ns = checkpoint_time_ns(job)};
+  EXPECT_FALSE(continues(before, job));
+  std::filesystem::remove(scratch / "a_tiles.h5");  // by a run that starts over
+  EXPECT_FALSE(continues(before, job));
+  write("a.h5", std::chrono::seconds(9));
+  EXPECT_TRUE(continues(before, job));
+}
+
 TEST(Needs, ComeFromThePlanOfARun) {
   const auto needs = [](std::int64_t threads) {
     return needs_of({.num_trials = 6,

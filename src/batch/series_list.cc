@@ -15,6 +15,7 @@
 #include "batch/csv.h"
 #include "batch/placeholders.h"
 #include "batch/relion_table.h"
+#include "io/lower_extension.h"
 #include "io/tables/relion_star.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -229,7 +230,7 @@ std::vector<Series> read_table(const fs::path& path, const KnownColumns& known,
                                base::Faults& faults) {
   std::vector<CsvRecord> records;
   try {
-    records = parse_csv(io::read_text_file(path), path.extension() == ".tsv" ? '\t' : ',');
+    records = parse_csv(io::read_text_file(path), io::lower_extension(path) == ".tsv" ? '\t' : ',');
   } catch (const Error& error) {
     throw Error(fmt::format("the table '{}' cannot be read: {}", path.string(), error.what()));
   }

@@ -22,7 +22,7 @@ std::optional<std::int64_t> checkpoint_time_ns(const Job& job) {
 bool continues(const State& before, const Job& job) {
   return can_resume(job.output) &&
          (!job.replaces ||
-          (has_begun(before) && checkpoint_time_ns(job) != before.old_checkpoint_ns));
+          (has_begun(before) && checkpoint_time_ns(job) > before.old_checkpoint_ns));
 }
 
 fs::path log_folder(const fs::path& folder) { return folder / "logs"; }

@@ -77,7 +77,7 @@ TaskResult run_task(const RunOptions& options, const JobList& list, int number, 
   else
     result.state = run_to_the_end(options, list, job, threads, time_is_up);
   if (result.state.progress == Progress::kStopped && time_is_up()) {
-    if (last_progress(job.output) == before) {
+    if (last_progress(job.output) <= before) {
       result.state.progress = Progress::kFailed;
       result.state.reason =
           "its time limit came before the first checkpoint: give more with --sbatch '--time=…'";

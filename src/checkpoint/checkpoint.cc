@@ -207,7 +207,9 @@ std::string as_text(const std::vector<std::int64_t>& numbers) {
 output::ModelInfo model_info(const measurement::Measurement& series,
                              const options::ReconstructOptions& options) {
   output::ModelInfo info = output::model_info(series, options.views.contrast);
-  info.options_json = options::options_text(options);
+  options::ReconstructOptions resolved = options;
+  resolved.views.bin = series.bin_factor;  // --angpix may have set it
+  info.options_json = options::options_text(resolved);
   if (options.alignment) info.alignment_json = alignment::text_of(options.alignment->origin);
   return info;
 }
@@ -217,7 +219,8 @@ output::TrainingState progress_state(const fit::Fit& fit, const FitOrigin& origi
   const fit::Progress& progress = fit.progress();
   state.integers["fingerprint"] = as_numbers(origin.fingerprint);
   if (origin.tuned) state.integers["tuning"] = as_numbers(trials_text(*origin.tuned));
-  if (origin.tile_rows) state.integers["tile_rows"] = {*origin.tile_rows};
+  if (origin.tile_rows && !origin.are_tile_rows_given)
+    state.integers["tile_rows"] = {*origin.tile_rows};
   state.integers["step"] = {progress.step};
   state.doubles["views"] = flatten(progress.views);
   state.doubles["epoch_sums"] = flatten(progress.epoch_sums);

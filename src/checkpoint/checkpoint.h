@@ -43,8 +43,8 @@ void save_checkpoint(const std::filesystem::path& path, const fit::Fit& fit,
 /// Error if `path` is neither.
 std::optional<tune::TunedFit> stored_choice(const std::filesystem::path& path);
 
-/// Returns FitOrigin::tile_rows of the fit in a checkpoint or in finished tiles. Throws Error if
-/// `path` is neither.
+/// Returns FitOrigin::tile_rows of the fit in a checkpoint, if the memory that was free decided
+/// them, or in finished tiles. Throws Error if `path` is neither.
 std::optional<int> stored_tile_rows(const std::filesystem::path& path);
 
 /// Throws Error if `path` is a model without the state of a fit, such as a compact one, which no

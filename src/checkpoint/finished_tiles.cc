@@ -1,6 +1,7 @@
 #include "checkpoint/finished_tiles.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
 #include <string>
@@ -48,6 +49,10 @@ void FinishedTiles::read() {
                     path, model.coded->thickness, series_.geometry.thickness));
   if (text("budget") != options_.field.budget)
     throw Error(fmt::format("'{}' was made with --budget {}: give the same", path, text("budget")));
+  if (const auto& rows = state.integers["tile_rows"];
+      origin_.tile_rows && rows != std::vector<std::int64_t>{*origin_.tile_rows})
+    throw Error(fmt::format("'{}' was made with --tile-rows {}: give the same", path,
+                            fmt::join(rows, ", ")));
   try {
     tiles_ = tiles_from(text("tiles"), series_.roi.height());
     require_whole_leaves();

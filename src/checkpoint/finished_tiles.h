@@ -24,7 +24,7 @@ void forget_old_tiles(const options::ReconstructOptions& options,
 class FinishedTiles {
  public:
   /// Reads what an earlier run has finished, if the run resumes. Throws Error if the file is of
-  /// another fit or of another budget. All references must outlive the object.
+  /// another fit, or of tiles or a budget of another size. All references must outlive the object.
   FinishedTiles(const options::ReconstructOptions& options, const measurement::Measurement& series,
                 const FitOrigin& origin);
 

@@ -16,6 +16,7 @@ struct FitOrigin {
   std::optional<tune::TunedFit> tuned;  ///< the trials that chose some of its options
   /// Rows of the tiles that it is fitted by; 0: the whole region. None: without --budget.
   std::optional<int> tile_rows = {};
+  bool are_tile_rows_given = false;  ///< by --tile-rows: the memory that was free did not decide
 };
 
 /// Returns the fingerprint of a fit (JSON): the options, the geometry and a checksum of the rays.

@@ -138,6 +138,8 @@ DetectionScore membrane_score(const base::Volume& volume, const base::Volume& la
     num_true += voxels[i].is_true ? 1 : 0;
   }
   if (num_true == 0) throw Error("the label of membranes has no voxel above 0.5: nothing to find");
+  if (num_true == voxels.size())
+    throw Error("the label of membranes has all voxels above 0.5: there is nothing else to tell");
   return score_detections(std::move(voxels), num_true);
 }
 

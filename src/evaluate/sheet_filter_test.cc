@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -86,6 +87,9 @@ TEST(MembraneScore, RefusesALabelWithoutMembranes) {
   const base::Volume label({16, 16, 16}, 10.0);
   EXPECT_THROW(membrane_score(label, label), Error);
   const base::Volume volume = shell(15.0, 2.0);
+  base::Volume everywhere = volume;
+  std::ranges::fill(everywhere.data, 1.0f);
+  EXPECT_THROW(membrane_score(volume, everywhere), Error);
   base::Volume broken = volume;
   broken.data[7] = std::nanf("");
   EXPECT_THROW(membrane_score(volume, broken), Error);

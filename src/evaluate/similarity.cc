@@ -53,6 +53,9 @@ void require_finite(std::span<const float> values, const char* name) {
 double peak_of(std::span<const float> truth) {
   const auto [low, high] = std::minmax_element(truth.begin(), truth.end());
   const double peak = static_cast<double>(*high) - std::min(0.0, static_cast<double>(*low));
+  if (*low == *high)
+    throw Error(
+        fmt::format("every voxel of the truth is {}: there is nothing to compare with", *high));
   if (!(peak > 0.0))
     throw Error(fmt::format(
         "the truth's largest voxel is {}: its range must reach above 0 for a peak to exist",

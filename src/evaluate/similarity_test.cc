@@ -97,11 +97,12 @@ TEST(Psnr, ConstantReconstructionHasNoScale) {
 }
 
 TEST(Psnr, RefusesWhatHasNoScore) {
-  const std::vector<float> fine{0.0f, 1.0f}, zero{0.0f, 0.0f};
+  const std::vector<float> fine{0.0f, 1.0f}, zero{0.0f, 0.0f}, one{1.1f, 1.1f};
   const std::vector<float> broken{0.0f, std::numeric_limits<float>::quiet_NaN()};
   EXPECT_THROW(psnr(broken, fine), Error);
   EXPECT_THROW(psnr(fine, broken), Error);
   EXPECT_THROW(psnr(fine, zero), Error);
+  EXPECT_THROW(psnr(fine, one), Error);
 }
 
 TEST(Compare, IsTheSameForAnyNumberOfThreads) {

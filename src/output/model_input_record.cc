@@ -44,6 +44,13 @@ ModelInput input_of(const ModelInfo& info) {
   return found;
 }
 
+VolumeAxes axes_of_tomogram(const ModelInfo& info) {
+  const auto options = nlohmann::json::parse(info.options_json, nullptr, false);
+  const nlohmann::json::json_pointer axes("/volume/axes");
+  const bool is_xzy = options.is_object() && options.contains(axes) && options.at(axes) == "xzy";
+  return is_xzy ? VolumeAxes::kXzy : VolumeAxes::kXyz;
+}
+
 std::vector<std::string> volume_labels(const ModelInfo& info, const std::string& made_by) {
   std::vector<std::string> labels{fmt::format("tomofield {}: {}", library_version(), made_by)};
   const ModelInput input = input_of(info);

@@ -16,6 +16,10 @@ struct ModelInput {
 };
 ModelInput input_of(const ModelInfo& info);
 
+/// Returns the order of the axes in the tomogram that a model's run wrote, as far as its options
+/// say it: else x, y, z.
+VolumeAxes axes_of_tomogram(const ModelInfo& info);
+
 /// Returns the labels of a volume's header: which program and version made it and how, and the
 /// names of the files that the series was read and aligned by. The complete command is in the
 /// metrics: the same data give the same bytes wherever the results are written.

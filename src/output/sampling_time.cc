@@ -127,12 +127,13 @@ Work work_of(const BoxBounds& model, std::span<const OrientedBox> boxes) {
 }  // namespace
 
 void announce_sampling(const Model& model, std::span<const OrientedBox> boxes) {
-  constexpr double kFewPoints = 1 << 27, kShort_s = 10, kLong_s = 600;
+  constexpr double kFewPoints = 1 << 27, kFewTurnedPoints = 1 << 24, kShort_s = 10, kLong_s = 600;
   constexpr double kSeconds_a_voxel = 8e-9;  // to write it, also beside the model
   constexpr std::size_t kFewBoxes = 10000;
   const auto count = static_cast<double>(boxes.size());
   const auto& [nx, ny, nz] = boxes.front().size;
-  if (field::num_points(boxes.front()) * count < kFewPoints && boxes.size() < kFewBoxes) return;
+  const double few = boxes.front().is_aligned() ? kFewPoints : kFewTurnedPoints;
+  if (field::num_points(boxes.front()) * count < few && boxes.size() < kFewBoxes) return;
   const BoxBounds bounds = field_bounds(model);
   const Work work = work_of(bounds, boxes);
   const double voxels =

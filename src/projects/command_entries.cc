@@ -7,6 +7,7 @@
 #include <cctype>
 #include <utility>
 
+#include "io/is_file.h"
 #include "io/named_file.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
@@ -70,7 +71,13 @@ fs::path command_file_beside(const fs::path& tilt_com, std::string_view program)
   const std::string name = tilt_com.filename().string();
   constexpr std::string_view kTilt = "tilt";
   const std::string axis = name.starts_with(kTilt) ? name.substr(kTilt.size()) : ".com";
-  return tilt_com.parent_path() / (std::string(program) + axis);
+  const auto beside = [&](const std::string& end) {
+    return tilt_com.parent_path() / (std::string(program) + end);
+  };
+  // A copy, tilt_thick.com or tilta_thick.com, may have no files of its own.
+  const std::size_t own_name = axis.find('_');
+  if (own_name > 1 || io::is_file(beside(axis))) return beside(axis);
+  return beside(axis.substr(0, own_name) + ".com");
 }
 
 CommandEntries::CommandEntries(Project& project, const fs::path& file, std::string_view program)

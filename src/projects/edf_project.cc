@@ -161,6 +161,16 @@ void set_dataset(Project& project, const fs::path& edf, const Entries& entries,
     project.set("--xtilt", xtilt.string(), edf, kEntry);
 }
 
+// Throws Error if tilt.com is of another dataset.
+void require_same_dataset(const Project& project, const fs::path& edf, const std::string& name) {
+  const fs::path stack = project.value_of("stack");
+  if (stack.filename().string().starts_with(name)) return;
+  throw Error(
+      fmt::format("'{}' is of the dataset '{}', and the tilt.com beside it reads '{}': give the "
+                  "tilt.com or the stack that you mean",
+                  edf.string(), name, stack.string()));
+}
+
 }  // namespace
 
 void read_edf_project(Project& project) {
@@ -170,6 +180,7 @@ void read_edf_project(Project& project) {
   if (is_file(tilt)) {
     project.add_file(tilt);
     read_imod_project(project, tilt);
+    require_same_dataset(project, edf, value_of(entries, "Setup.DatasetName"));
     // The size is that of the raw stack.
     if (!project.value_of("--xf").empty())
       set_pixel_size(project, edf, entries, pixel_size_A(project.value_of("stack")));

@@ -78,9 +78,8 @@ bool is_montage(const fs::path& tilt) {
 }
 
 // Returns eTomo's name of a dataset by that of its aligned stack: NAME_ali.mrc or NAME.ali.
-std::string series_name_of(CommandEntries& tilt) {
-  const auto aligned = tilt.path("InputProjections");
-  std::string name = aligned ? aligned->filename().string() : std::string();
+std::string series_name_of(const fs::path& aligned) {
+  std::string name = aligned.filename().string();
   for (const std::string_view end : {"_ali.mrc", ".ali"})
     if (name.ends_with(end)) name.erase(name.size() - end.size());
   return name;
@@ -90,7 +89,7 @@ std::string series_name_of(CommandEntries& tilt) {
 std::optional<RawFiles> usual_raw_files(Project& project, CommandEntries& tilt) {
   const auto aligned = tilt.path("InputProjections");
   if (!aligned || project.ignores("TransformFile") || is_montage(tilt.file())) return std::nullopt;
-  const std::string name = series_name_of(tilt);
+  const std::string name = series_name_of(*aligned);
   const fs::path folder = aligned->parent_path();
   const fs::path xf = folder / (name + ".xf");
   if (!is_file(xf)) return std::nullopt;
@@ -131,6 +130,13 @@ double find_bin(Project& project, CommandEntries& tilt, CommandEntries* newst, b
   constexpr double kBinOfNewstack = 1.0;  // without the entry
   if (newst != nullptr && !of_newst && of_tilt && !project.ignores("BinByFactor"))
     of_newst = kBinOfNewstack;
+  if (!of_tilt && of_newst.value_or(1.0) != 1.0 && !project.ignores("IMAGEBINNED"))
+    throw Error(fmt::format(
+        "'{0}' has BinByFactor {1}, and '{2}' no IMAGEBINNED, so that tilt counts lengths in "
+        "binned "
+        "pixels: write IMAGEBINNED {1} and lengths in unbinned pixels into it, or go on with "
+        "--ignore IMAGEBINNED if they are that",
+        newst->file().string(), *of_newst, tilt.file().string()));
   if (of_tilt && of_newst && *of_tilt != *of_newst) {
     throw Error(fmt::format(
         "'{}' has BinByFactor {} and '{}' IMAGEBINNED {}, so lengths cannot be told: align the "
@@ -145,6 +151,18 @@ double find_bin(Project& project, CommandEntries& tilt, CommandEntries* newst, b
                 of_newst ? "BinByFactor" : "IMAGEBINNED");
   }
   return bin;
+}
+
+// Warns if newst.com makes another stack than tilt.com reads.
+void warn_of_other_series(Project& project, CommandEntries& tilt, CommandEntries* newst) {
+  const auto read = tilt.path("InputProjections");
+  const auto made = newst == nullptr ? std::nullopt : newst->path("OutputFile");
+  if (!read || !made || series_name_of(*read) == series_name_of(*made)) return;
+  project.warn(fmt::format(
+      "'{}' makes '{}' and '{}' reads '{}': are both of one series? (--ignore OutputFile says that "
+      "they are)",
+      newst->file().string(), made->filename().string(), tilt.file().string(),
+      read->filename().string()));
 }
 
 // Fills in how the aligned stack that newst.com makes of a raw one lies over the views. Without a
@@ -200,7 +218,7 @@ ImodImages read_raw(Project& project, const RawFiles& raw, CommandEntries& tilt,
   images.num_sections = stack->header().nz;
   images.pixel_size_A = stack->header().voxel_size_A[0];
   images.is_raw = true;
-  images.series_name = series_name_of(tilt);
+  images.series_name = series_name_of(tilt.path("InputProjections").value_or(fs::path()));
   images.bin = find_bin(project, tilt, newst, true);
   images.has_newst = newst != nullptr;
   images.width = images.imod_width = static_cast<double>(size[0]);
@@ -222,7 +240,7 @@ ImodImages read_aligned(Project& project, const NamedFile& aligned, CommandEntri
   images.stack = aligned.path;
   images.num_sections = stack->header().nz;
   images.pixel_size_A = stack->header().voxel_size_A[0];
-  images.series_name = series_name_of(tilt);
+  images.series_name = series_name_of(tilt.path("InputProjections").value_or(fs::path()));
   images.is_phase_flipped = io::is_phase_flipped(stack->header());
   images.bin = images.unit = find_bin(project, tilt, newst, false);
   images.width = images.imod_width = static_cast<double>(stack->header().nx) * images.unit;
@@ -251,6 +269,7 @@ ImodImages choose_imod_images(Project& project, CommandEntries& tilt, CommandEnt
   if (newst != nullptr && hindrance.empty()) raw = raw_files_of(*newst);
   if (!raw && hindrance.empty()) raw = usual_raw_files(project, tilt);
   const auto aligned = find_file(tilt, "InputProjections");
+  warn_of_other_series(project, tilt, newst);
   if (newst != nullptr) newst->know(kHarmless);
   // Results must not replace the images of the project, whichever of them are read.
   if (aligned) project.add_file(aligned->path);

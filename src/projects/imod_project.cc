@@ -11,6 +11,7 @@
 
 #include "io/is_file.h"
 #include "io/tables/alignment_files.h"
+#include "io/tables/ctf_table.h"
 #include "io/tables/text_lines.h"
 #include "projects/command_entries.h"
 #include "projects/formats.h"
@@ -209,6 +210,21 @@ void set_excluded(Project& project, CommandEntries& tilt, std::int64_t num_secti
               included.empty() ? fmt::format("{}", fmt::join(names, ", ")) : "INCLUDE");
 }
 
+// Warns of directions in the raw stack, against which the aligned one is turned.
+void warn_of_astigmatism(Project& project, const ImodImages& images) {
+  constexpr double kLeast_A = 1.0;
+  const fs::path file = project.value_of("--ctf");
+  if (images.is_raw || file.empty()) return;
+  const auto is_astigmatic = [](const std::optional<io::Defocus>& view) {
+    return view && std::abs(view->u_A - view->v_A) > kLeast_A;
+  };
+  if (std::ranges::none_of(io::read_ctf(file).views, is_astigmatic)) return;
+  project.warn(
+      fmt::format("'{}' has the directions of astigmatism in the raw stack, and the aligned stack "
+                  "'{}' is read, which is turned against it: they are taken as they are",
+                  file.string(), images.stack.string()));
+}
+
 void set_intensities(Project& project, CommandEntries& tilt) {
   if (!tilt.text("LOG")) return;
   const double base = tilt.number("LOG").value_or(0.0);  // "LOG /" stands for 0
@@ -235,6 +251,12 @@ void read_imod_project(Project& project, const fs::path& tilt_com) {
   const bool has_defocus = set_imod_transfer(project, tilt.file(), images.series_name);
   if (has_defocus && images.is_phase_flipped)
     project.set("--ctf-phase-flipped", "true", images.stack, "ctfphaseflip");
+  if (has_defocus) warn_of_astigmatism(project, images);
+  if (!images.is_raw && images.bin != 1.0 && !project.value_of("--mtf").empty())
+    project.warn(fmt::format(
+        "'{}' counts for pixels as they were recorded, and those of '{}' are binned by {}: the "
+        "detector's transfer is taken as if they were not",
+        project.value_of("--mtf"), images.stack.string(), images.bin));
   const StackPixels pixels{images.pixel_size_A, images.bin, images.is_raw};
   set_imod_optics(project, tilt.file(), pixels, has_defocus || project.request().has_transfer);
   tilt.know(kHarmless);

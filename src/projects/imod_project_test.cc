@@ -222,6 +222,49 @@ TEST(ImodProject, BinningsThatDiffer) {
   imod.write_tilt("IMAGEBINNED 2\n");
   expect_parts(imod.refusal(), {"BinByFactor 4", "IMAGEBINNED 2"});
   EXPECT_EQ(imod.values({"BinByFactor"}).at("--bin"), "2");
+  imod.write_tilt("");  // tilt counts lengths in pixels of its images then
+  expect_parts(imod.refusal(), {"BinByFactor 4", "no IMAGEBINNED"});
+  EXPECT_EQ(imod.values({"IMAGEBINNED"}).at("--bin"), "4");
+}
+
+TEST(ImodProject, ACopyHasTheFilesOfTheFirst) {
+  const ImodFolder imod;
+  imod.write_newst("BinByFactor 2\n");
+  imod.write_tilt("IMAGEBINNED 2\n");
+  for (const auto& [copy, newst] :
+       {std::pair("tilt_thick.com", "newst.com"), {"tilta_thick.com", "newsta.com"}}) {
+    std::filesystem::copy_file(imod.folder / "tilt.com", imod.folder / copy);
+    if (!std::filesystem::exists(imod.folder / newst))
+      std::filesystem::copy_file(imod.folder / "newst.com", imod.folder / newst);
+    const Project project = read_project({.path = imod.folder / copy}).value();
+    const auto& bin = *std::ranges::find(project.settings(), "--bin", &Setting::option);
+    EXPECT_EQ(bin.file, imod.folder / newst);
+  }
+}
+
+TEST(ImodProject, StacksOfOtherSeriesAreNamed) {
+  const ImodFolder imod;
+  imod.folder.write("newst.com",
+                    "$newstack -StandardInput\nInputFile TS.st\nOutputFile TS_02_ali.mrc\n"
+                    "TransformFile TS.xf\nSizeToOutputInXandY 60,40\n");
+  imod.write_tilt("");
+  expect_parts(imod.warnings(), {"TS_02_ali.mrc", "TS_ali.mrc"});
+  EXPECT_EQ(imod.warnings({"OutputFile"}), "");
+  const auto edf = imod.folder.write("TS_02.edf", "Setup.DatasetName=TS_02\n");
+  expect_parts(message_of<Error>([&] { read_project({.path = edf}); }),
+               {"TS_02.edf", "'TS_02'", "TS.st"});
+}
+
+TEST(ImodProject, DirectionsOfAstigmatismHoldForTheRawStack) {
+  const ImodFolder imod;
+  write_stack(imod.folder / "TS_ali.mrc", 15, 10, 5, some_value);
+  imod.write_newst("SizeToOutputInXandY 60,40\n");
+  imod.write_tilt("");
+  imod.folder.write("TS.defocus", "1 0 0. 0. 0 3\n1 1 0 0 1500 1500 0\n");
+  EXPECT_EQ(imod.warnings({"TransformFile"}), "");
+  imod.folder.write("TS.defocus", "1 0 0. 0. 0 3\n1 1 0 0 1500 1400 30\n");
+  expect_parts(imod.warnings({"TransformFile"}), {"astigmatism", "TS_ali.mrc"});
+  EXPECT_EQ(imod.warnings(), "");
 }
 
 TEST(ImodProject, ImagesThatTransformsDoNotMakeAreReadAligned) {

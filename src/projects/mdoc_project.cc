@@ -54,7 +54,7 @@ void read_mdoc_project(Project& project) {
   }
   project.set("--mdoc", mdoc.string(), mdoc, "ZValue");
   fs::path stem = mdoc.stem();
-  if (stem.has_extension()) stem = stem.stem();  // "TS_01" of "TS_01.mrc.mdoc"
+  if (has_extension_of_stack(stem)) stem = stem.stem();  // "TS_01" of "TS_01.mrc.mdoc"
   if (!set_transfer_files(project, mdoc.parent_path(), stem.string()))
     set_target_defocus(project, mdoc, contents);
   if (contents.voltage_kV)

@@ -18,6 +18,7 @@ struct Request {
   std::string series = {};                ///< of a project that has several (--series); empty: all
   bool has_mdoc = false;      ///< the user gave --mdoc, so a folder may be that of its images
   bool has_transfer = false;  ///< the user gave a contrast transfer, which optics describe
+  std::optional<double> pixel_size_A = {};  ///< that the user gave, if any
 };
 
 /// The files of another program as settings of this one, each with its origin.

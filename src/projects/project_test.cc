@@ -120,6 +120,18 @@ TEST(MdocProject, SetsTheTargetOfTheDefocusWhereNothingMeasuresIt) {
   EXPECT_EQ(set_by(with_pixels + target), "--ctf " + (folder / "TS_ctf.txt").string() + " CTF");
 }
 
+TEST(MdocProject, NamesMayHavePoints) {
+  const ScratchDirectory folder;
+  write_stack(folder / "lam1.2.mrc", 16, 12, 1, some_value);
+  const std::string row = "1 30000 30000 0 0 0.5 5\n";
+  for (const char* name : {"lam1_ctf.txt", "lam1.2_ctf.txt"}) folder.write(name, row);
+  for (const char* name : {"lam1.2.mdoc", "lam1.2.mrc.mdoc"}) {
+    const auto mdoc = folder.write(name, "[ZValue = 0]\nTiltAngle = 1\n");
+    EXPECT_EQ(read_project({.path = mdoc})->value_of("--ctf"),
+              (folder / "lam1.2_ctf.txt").string());
+  }
+}
+
 TEST(MdocProject, FindsTheStackOrTheImages) {
   const ScratchDirectory folder;
   const auto mdoc = folder.write("TS.mdoc",

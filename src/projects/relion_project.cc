@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "io/images/image_stack.h"
 #include "io/images/view_images.h"
@@ -92,6 +93,13 @@ void set_detector(Project& project, const io::RelionTomogram& tomogram, const fs
   } catch (const Error& absent) {
     throw Error(fmt::format("{}, or go on without it with --ignore {}", absent.what(), kEntry));
   }
+  constexpr double kSamePixel = 0.01;
+  const auto recorded_A = tomogram.recorded_pixel_A, views_A = tomogram.pixel_size_A;
+  if (recorded_A && views_A && std::abs(*recorded_A / *views_A - 1.0) > kSamePixel)
+    project.warn(fmt::format(
+        "'{}', tomogram {}: the detector's transfer counts for pixels of {:.6g} Å "
+        "(rlnMicrographOriginalPixelSize), and is taken for those of the views of {:.6g} Å",
+        star.string(), tomogram.name, *recorded_A, *views_A));
 }
 
 // Warns if a tomogram's pixels are not those of its images.

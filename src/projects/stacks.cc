@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "io/images/image_stack.h"
@@ -16,6 +18,8 @@ namespace tomofield::projects {
 
 namespace fs = std::filesystem;
 namespace {
+
+constexpr std::array kExtensions{".mrc", ".st", ".mrcs", ".tif", ".tiff"};
 
 // A file that cannot be read may be the stack: the error says so when it is opened.
 bool is_stack(const fs::path& path) {
@@ -35,9 +39,13 @@ std::optional<fs::path> find_stack_beside(const fs::path& file, const std::strin
   if (is_stack(stem)) return stem;
   if (const fs::path stack = file.parent_path() / named; !named.empty() && is_stack(stack))
     return stack;
-  for (const char* extension : {".mrc", ".st", ".mrcs", ".tif", ".tiff"})
+  for (const char* extension : kExtensions)
     if (const fs::path stack = stem.string() + extension; is_stack(stack)) return stack;
   return std::nullopt;
+}
+
+bool has_extension_of_stack(const fs::path& name) {
+  return std::ranges::count(kExtensions, name.extension()) > 0;
 }
 
 bool are_other_pixels(double stated_A, double in_header_A) {

@@ -15,6 +15,9 @@ namespace tomofield::projects {
 std::optional<std::filesystem::path> find_stack_beside(const std::filesystem::path& file,
                                                        const std::string& named);
 
+/// Tells whether a name ends as those of stacks do, such as ".mrc".
+bool has_extension_of_stack(const std::filesystem::path& name);
+
 /// A pixel size that an entry of a file states.
 struct StatedPixelSize {
   std::filesystem::path file;

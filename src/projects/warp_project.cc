@@ -43,7 +43,8 @@ void read_warp_project(Project& project) {
   if (may_transfer && table.defocus_hand)
     project.set("--defocus-hand", fmt::format("{}", *table.defocus_hand), path,
                 "AreAnglesInverted");
-  const double pixel_A = set_pixel_size(project, table);
+  const double stated_A = set_pixel_size(project, table);
+  const double pixel_A = project.request().pixel_size_A.value_or(stated_A);
   if (table.thickness_A && pixel_A > 0) {
     project.set("--thickness", fmt::format("{:.0f}", *table.thickness_A / pixel_A), path,
                 "VolumeDimensionsAngstrom");

@@ -264,6 +264,7 @@ RunResult fit_all_views(const Run& run, const plan::TilePlan& tiles,
                         std::optional<tune::TunedFit> tuned) {
   FitOutcome outcome{.origin = origin_of(run, std::move(tuned))};
   if (!run.options.field.budget.empty()) outcome.origin.tile_rows = tiles.rows;
+  outcome.origin.are_tile_rows_given = run.options.field.tile_rows.has_value();
   if (!run.options.run.resume) checkpoint::forget_old_tiles(run.options, run.processes);
   if (tiles.is_used()) return fit_by_tiles(run, tiles, outcome);
   const FitRun made = run_fit(run, {.measurement = run.measurement,

@@ -34,7 +34,7 @@ struct CoarseStart {
   double part_of_work = 0.0;  // of the coarse stages in that of the whole run
 };
 
-// Holds what is kept of the fit of a tile near the middle, which speaks for all of them.
+// Holds what is kept of the fit of the tile in the middle, which speaks for all of them.
 struct Example {
   record::FitRecord found;
   std::optional<measurement::PredictedView> held_out_view;
@@ -81,29 +81,29 @@ class TileFits {
     fit_options_.fit_view_scale = false;  // the coarse stages have found scales for all tiles
   }
 
+  // Fits a tile for an example alone. Returns nothing if the run was stopped.
+  std::optional<Example> fit_example(const plan::Tile& tile) const {
+    const measurement::Measurement rays = rays_of(tile);
+    const std::unique_ptr<fit::Fit> fit = fitted(tile, rays, "again, for the report, ");
+    if (!fit) return std::nullopt;
+    return example_of(tile, rays, *fit);
+  }
+
   // Returns false if the run was stopped.
   bool fit(const plan::Tile& tile, std::optional<Example>* example) {
     const base::TraceSpan span("tile");
     const base::Stopwatch running;
-    std::vector<int> views(static_cast<std::size_t>(run_.measurement.geometry.num_views()));
-    std::iota(views.begin(), views.end(), 0);
-    const measurement::Measurement rays = some_rows(run_.measurement, tile.fitted, views);
-    auto fit = std::make_unique<fit::Fit>(rays, run_.options.field, fit_options_);
-    fit->go_on_from_stages(start_.progress, *start_.field);
-    if (!take_steps(tile, *fit)) return false;
+    const measurement::Measurement rays = rays_of(tile);
+    std::unique_ptr<fit::Fit> fit = fitted(tile, rays, "");
+    if (!fit) return false;
     const double seconds_fitting = running.seconds();
-    fit->free_optimizer();  // the verdict needs the memory
     checkpoint::FinishedTile done{.rows = tile.own,
                                   .fitted_rows = tile.fitted,
                                   .residual = fit->progress().data_loss.back(),
                                   .seconds_fitting = seconds_fitting};
     if (!rays.held_out.empty())
       done.held_out_error = fit->held_out_error(run_.options.fit.fit_view_scale).total;
-    if (example != nullptr) {
-      record::FitRecord found = examine(*fit, rays, run_, outcome_);
-      auto view = central_held_out_view(*fit, rays, found);
-      example->emplace(Example{std::move(found), std::move(view), tile});
-    }
+    if (example != nullptr) *example = example_of(tile, rays, *fit);
     std::unique_ptr<field::Field> vertices = fit->take_field();
     fit.reset();  // compression needs the memory
     const base::Stopwatch compressing;
@@ -115,14 +115,37 @@ class TileFits {
   }
 
  private:
+  measurement::Measurement rays_of(const plan::Tile& tile) const {
+    std::vector<int> views(static_cast<std::size_t>(run_.measurement.geometry.num_views()));
+    std::iota(views.begin(), views.end(), 0);
+    return some_rows(run_.measurement, tile.fitted, views);
+  }
+
+  // Returns the fit of a tile, or nothing if the run was stopped. `why` begins what progress says.
+  std::unique_ptr<fit::Fit> fitted(const plan::Tile& tile, const measurement::Measurement& rays,
+                                   const char* why) const {
+    auto fit = std::make_unique<fit::Fit>(rays, run_.options.field, fit_options_);
+    fit->go_on_from_stages(start_.progress, *start_.field);
+    if (!take_steps(tile, why, *fit)) return nullptr;
+    fit->free_optimizer();  // the verdict needs the memory
+    return fit;
+  }
+
+  Example example_of(const plan::Tile& tile, const measurement::Measurement& rays,
+                     const fit::Fit& fit) const {
+    record::FitRecord found = examine(fit, rays, run_, outcome_);
+    auto view = central_held_out_view(fit, rays, found);
+    return {std::move(found), std::move(view), tile};
+  }
+
   // Takes the steps of a tile. Returns false if the run was stopped.
-  bool take_steps(const plan::Tile& tile, fit::Fit& fit) const {
+  bool take_steps(const plan::Tile& tile, const char* why, fit::Fit& fit) const {
     const double of_tiles = 1 - start_.part_of_work;
     const auto rows = static_cast<double>(num_rows_);
-    const base::ProgressSink progress =
-        base::part_of(run_.observer.fit, start_.part_of_work + of_tiles * tile.own.begin / rows,
-                      of_tiles * tile.own.size() / rows,
-                      fmt::format("rows {} to {} of {}", tile.own.begin, tile.own.end, num_rows_));
+    const base::ProgressSink progress = base::part_of(
+        run_.observer.fit, start_.part_of_work + of_tiles * tile.own.begin / rows,
+        of_tiles * tile.own.size() / rows,
+        fmt::format("{}rows {} to {} of {}", why, tile.own.begin, tile.own.end, num_rows_));
     const base::Stopwatch running;
     const double first = fit.work(fit.progress().step), all = fit.work(fit.num_steps()) - first;
     bool stopped = false;
@@ -167,11 +190,11 @@ class TileFits {
 };
 
 // Returns the tile that is nearest to the middle of the region.
-std::size_t middle_tile(const std::vector<plan::Tile>& tiles, int num_rows) {
+const plan::Tile& middle_tile(const std::vector<plan::Tile>& tiles, int num_rows) {
   const auto distance = [&](const plan::Tile& tile) {
     return std::abs(tile.own.begin + tile.own.end - num_rows);
   };
-  return static_cast<std::size_t>(std::ranges::min_element(tiles, {}, distance) - tiles.begin());
+  return *std::ranges::min_element(tiles, {}, distance);
 }
 
 // Returns the record of the run: that of the example where it is of one fit, and that of all tiles.
@@ -229,14 +252,18 @@ RunResult fit_by_tiles(const Run& run, const plan::TilePlan& plan, FitOutcome& o
       outcome.origin);  // refuses tiles of another run before any work
   const std::optional<CoarseStart> start = fit_coarse_stages(run, plan, outcome);
   if (!start) return stopped();
-  const std::vector<plan::Tile> tiles = plan.tiles_from(finished.num_rows());
-  const std::size_t middle = middle_tile(tiles, plan.num_rows);
+  const std::vector<plan::Tile> all = plan.tiles_from(0);
+  const plan::Tile& middle = middle_tile(all, plan.num_rows);
   TileFits fits(run, outcome, *start, plan.num_rows, finished);
   std::optional<Example> example;
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
-    if (!fits.fit(tiles[i], i == middle ? &example : nullptr)) return stopped();
-    // A run that resumes has at least one tile to fit, which speaks for all.
-    if (i + 1 < tiles.size()) finished.save();
+  if (middle.own.begin < finished.num_rows()) {  // an earlier session has finished it
+    example = fits.fit_example(middle);
+    if (!example) return stopped();
+  }
+  const std::vector<plan::Tile> tiles = plan.tiles_from(finished.num_rows());
+  for (const plan::Tile& tile : tiles) {
+    if (!fits.fit(tile, tile.own.begin == middle.own.begin ? &example : nullptr)) return stopped();
+    if (&tile != &tiles.back()) finished.save();
   }
   return finish_tiles(run, outcome, finished, std::move(*example), start->seconds);
 }

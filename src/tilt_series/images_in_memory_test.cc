@@ -4,11 +4,13 @@
 #include <limits>
 #include <vector>
 
+#include "expect_parts.h"
 #include "io/images/image_stack.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
+#include "warning_catcher.h"
 
 namespace tomofield::tilt_series {
 namespace {
@@ -64,6 +66,23 @@ TEST(ImagesInMemory, RefuseTiltsThatAreNoUsableAngles) {
         io::image_stack_in_memory(all_values(), kWidth, kHeight, {-20.0, tilt_deg, 40.0}, 2.5);
     EXPECT_THROW(TiltSeries{options}, Error) << tilt_deg;
   }
+}
+
+TEST(ImagesInMemory, AnOffsetThatMakesATiltTooSteepIsNamed) {
+  TiltSeriesOptions options;
+  options.images = io::image_stack_in_memory(all_values(), kWidth, kHeight, {-20, 0, 60}, 2.5);
+  options.tilt_offset_deg = 25;
+  testing::expect_parts(message_of<Error>([&] { const TiltSeries series(options); }),
+                        {"85°", "25° of --tilt-offset"});
+}
+
+TEST(ImagesInMemory, OneViewAloneIsWarnedOf) {
+  TiltSeriesOptions options;
+  options.images = io::image_stack_in_memory(all_values(), kWidth, kHeight, {-20, 0, 60}, 2.5);
+  options.exclude = "1-2";
+  const testing::WarningCatcher caught;
+  const TiltSeries series(options);
+  testing::expect_parts(caught.text(), {"section 3 alone"});
 }
 
 TEST(ImagesInMemory, AreNotToldOfOptionsForFiles) {

@@ -177,6 +177,12 @@ void warn_of_headers(const TiltSeriesOptions& options, const io::ImageStack& sta
   const io::MrcHeader& header = stack.header();
   for (const std::string& difference : header.differences)
     base::log_warning(fmt::format("the header of '{}' states {}", stack.name(), difference));
+  if (header.has_rows_from_top && (options.xf || options.local || options.fiducials))
+    base::log_warning(fmt::format(
+        "IMOD reads the rows of '{}' from the top, by the version that FEI's header states, and "
+        "other programs and this one from the bottom: with files of IMOD, give the stack that its "
+        "newstack writes of it",
+        stack.name()));
   warn_of_titles(options, stack);
   warn_of_second_alignment(options, stack);
   if (mdoc)

@@ -194,23 +194,31 @@ void warn_of_sections_beyond(const TiltSeriesOptions& options, const io::ImageSt
       stack.name(), stack.header().nz, facts->sections_beyond));
 }
 
+// Returns the whole number that a factor is but for the digits of a pixel size: headers round it to
+// 7, and factors that are not whole resample the views.
+double whole_if_near(double factor) {
+  constexpr double kRounding = 1e-5;
+  return std::fabs(factor - std::round(factor)) <= kRounding * factor ? std::round(factor) : factor;
+}
+
 double find_bin_factor(const TiltSeriesOptions& options, const SeriesPlan& plan) {
   if (options.angpix && options.bin != 1.0) {
     throw Error("--bin and --angpix both set the size of the binned pixels; give one of them");
   }
-  const double factor = options.angpix ? *options.angpix / plan.pixel_size_A : options.bin;
-  if (!std::isfinite(factor) || factor < 1.0 - 1e-6) {
+  const double factor =
+      whole_if_near(options.angpix ? *options.angpix / plan.pixel_size_A : options.bin);
+  if (!std::isfinite(factor) || factor < 1.0) {
     throw Error(options.angpix
                     ? fmt::format("--angpix {} is below the stack's pixel size of {} Å: views can "
                                   "be reduced, not enlarged",
                                   *options.angpix, plan.pixel_size_A)
                     : fmt::format("--bin {} must be 1 or more", options.bin));
   }
-  if (reduced_size(std::min(plan.aligned_width, plan.aligned_height), std::max(factor, 1.0)) < 1) {
+  if (reduced_size(std::min(plan.aligned_width, plan.aligned_height), factor) < 1) {
     throw Error(fmt::format("binning by {} leaves nothing of views of {} × {} pixels", factor,
                             plan.aligned_width, plan.aligned_height));
   }
-  return std::max(factor, 1.0);
+  return factor;
 }
 
 /// Returns the x-axis tilt of each section: from --xtilt, else from the table, else 0.
@@ -382,7 +390,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
   TiltAngles tilts = angles;
   for (auto& tilt : tilts.of_section)
     if (tilt) tilt->value += options.tilt_offset_deg;
-  require_usable_tilts(tilts, sections, stack);
+  require_usable_tilts(tilts, options.tilt_offset_deg, sections, stack);
   FileMotion motion(options, stack, table, plan.pixel_size_A, size);
   for (const std::int64_t section : sections) {
     const auto at = static_cast<std::size_t>(section);

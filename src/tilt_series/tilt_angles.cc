@@ -50,7 +50,8 @@ std::string describe_unusable(const TiltAngles& angles, const std::vector<std::i
 }
 
 // Describes sections, counted from 1, that are tilted too far.
-std::string describe_steep(const TiltAngles& angles, const std::vector<std::int64_t>& steep) {
+std::string describe_steep(const TiltAngles& angles, const std::vector<std::int64_t>& steep,
+                           double offset_deg) {
   std::vector<std::string> texts;
   for (const std::int64_t section : steep) {
     const io::NumberLine& angle = *angles.of_section[static_cast<std::size_t>(section - 1)];
@@ -59,10 +60,12 @@ std::string describe_steep(const TiltAngles& angles, const std::vector<std::int6
   }
   const bool is_one = steep.size() == 1;
   return fmt::format(
-      "'{}': the tilt angle{} {} {} beyond ±{:.0f}°, which cannot be reconstructed; correct {}, or "
-      "leave the section{} out with --exclude {}",
-      angles.source, is_one ? "" : "s", fmt::join(texts, ", "), is_one ? "is" : "are",
-      base::kLargestTilt_deg, is_one ? "it" : "them", is_one ? "" : "s", io::section_list(steep));
+      "'{}': the tilt angle{} {}{} {} beyond ±{:.0f}°, which cannot be reconstructed; correct {}, "
+      "or leave the section{} out with --exclude {}",
+      angles.source, is_one ? "" : "s", fmt::join(texts, ", "),
+      offset_deg == 0.0 ? "" : fmt::format(", with the {:.6g}° of --tilt-offset,", offset_deg),
+      is_one ? "is" : "are", base::kLargestTilt_deg, is_one ? "it" : "them", is_one ? "" : "s",
+      io::section_list(steep));
 }
 
 void require_different(const TiltAngles& angles, std::span<const std::int64_t> sections,
@@ -70,7 +73,9 @@ void require_different(const TiltAngles& angles, std::span<const std::int64_t> s
   constexpr double kLeastSpan_deg = 0.1;       // stages are less exact
   constexpr double kLeastUsualSpan_deg = 3.2;  // a series in radians spans less
   constexpr std::size_t kFewestViews = 5;
-  if (sections.size() < 2) return;
+  if (sections.size() == 1)
+    return base::log_warning(fmt::format("'{}': section {} alone is used, which is no tilt series",
+                                         stack.name(), sections.front() + 1));
   const auto [low, high] = std::ranges::minmax(sections, {}, [&](std::int64_t section) {
     return angles.of_section[static_cast<std::size_t>(section)]->value;
   });
@@ -133,8 +138,8 @@ TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::ImageSta
   return angles;
 }
 
-void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t> sections,
-                          const io::ImageStack& stack) {
+void require_usable_tilts(const TiltAngles& angles, double offset_deg,
+                          std::span<const std::int64_t> sections, const io::ImageStack& stack) {
   std::vector<std::int64_t> missing, unusable, steep;
   for (const std::int64_t section : sections) {
     const auto& angle = angles.of_section[static_cast<std::size_t>(section)];
@@ -153,7 +158,7 @@ void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t
                     missing.size() == 1 ? "it" : "them"));
   }
   if (!unusable.empty()) throw Error(describe_unusable(angles, unusable));
-  if (!steep.empty()) throw Error(describe_steep(angles, steep));
+  if (!steep.empty()) throw Error(describe_steep(angles, steep, offset_deg));
   require_different(angles, sections, stack);
 }
 

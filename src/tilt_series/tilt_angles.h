@@ -36,9 +36,9 @@ void require_count(std::size_t found, const std::filesystem::path& file, const c
                    const io::ImageStack& stack);
 
 /// Throws Error that names all of these sections at once whose angle is missing or beyond ±80°
-/// (file, line, value), or if the angles of several sections are all the same. Warns of angles that
-/// may be radians.
-void require_usable_tilts(const TiltAngles& angles, std::span<const std::int64_t> sections,
-                          const io::ImageStack& stack);
+/// (file, line, value), or if the angles of several sections are all the same. Warns of one section
+/// alone, and of angles that may be radians. The angles contain `offset_deg` (--tilt-offset).
+void require_usable_tilts(const TiltAngles& angles, double offset_deg,
+                          std::span<const std::int64_t> sections, const io::ImageStack& stack);
 
 }  // namespace tomofield::tilt_series

@@ -165,6 +165,20 @@ TEST(TiltSeries, BinningKeepsExactPixelSizes) {
   EXPECT_FLOAT_EQ(load(halved, 0).image[1], mean);
 }
 
+TEST(TiltSeries, ASizeThatAHeaderHasRoundedIsTheSame) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  for (const double stored_A : {1.34, 3.37}) {
+    options.pixel_size_A = static_cast<double>(static_cast<float>(stored_A * 48) / 48.0f);
+    for (const int bin : {1, 2}) {
+      options.angpix = bin * stored_A;
+      const TiltSeries series(options);
+      EXPECT_EQ(series.bin_factor(), bin);
+      EXPECT_EQ(series.width(), 16 / bin);
+    }
+  }
+}
+
 TEST(TiltSeries, PixelSizeOfTheMdocWhereTheHeaderHasNone) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = small_series(scratch, 1);

@@ -283,6 +283,15 @@ def test_a_pattern_without_quotes_is_answered_with_quotes(data):
     assert "'nowhere' belongs to no option" in said.stderr, said.stderr
 
 
+def test_a_table_may_have_an_ending_in_capitals(data):
+    folder = harness.fresh_directory("capitals")
+    table = write_table(os.path.join(folder, "LIST.CSV"),
+                        [["stack", "tlt", "thickness"],
+                         [os.path.join(data, "a.mrc"), os.path.join(data, "a.tlt"), 16]])
+    said = harness.succeed("batch", table, "-o", os.path.join(folder, "out"), "--dry-run")
+    assert "1 of 1 series" in said.stdout, said.stdout
+
+
 def test_a_table_gives_each_series_its_own_options(data):
     folder = harness.fresh_directory("table")
     other = os.path.join(folder, "other", "two.mrc")
@@ -887,7 +896,7 @@ def test_a_task_that_cannot_be_submitted_again_says_so_in_the_summary(data):
                                  "SLURM_ARRAY_TASK_ID": "1"})
     model = os.path.join(results, "a.h5")
     while "a.log" not in os.listdir(os.path.join(results, "logs")) or \
-            b"epoch" not in harness.read_bytes(os.path.join(results, "logs/a.log")):
+            b"epoch 1/" not in harness.read_bytes(os.path.join(results, "logs/a.log")):
         time.sleep(0.05)
         assert task.poll() is None, task.communicate()
     task.send_signal(signal.SIGUSR1)

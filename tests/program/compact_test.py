@@ -148,9 +148,16 @@ def test_tiles_go_on_after_a_stop(tall, tmp_path):
         pytest.skip("the run ended before its signal")
     assert run.returncode == 143
     refuse(*tall[:-1], "1dB", "--tile-rows", 64, "-o", stopped, "--resume", says="give the same")
+    refuse(*tall, "--tile-rows", 128, "-o", stopped, "--resume", says="with --tile-rows 64: give the same")
     said = harness.succeed(*tall, "--tile-rows", 64, "-o", stopped, "--resume").stderr
     assert "after row 64" in said
     assert np.array_equal(read(tiles), read(stopped))
+    metrics = []  # of the middle tile, which the first session has finished
+    for volume in (tiles, stopped):
+        with open(volume.with_suffix(".json"), encoding="utf-8") as file:
+            metrics.append(json.load(file)["metrics"])
+    assert metrics[0]["example_tile"] == metrics[1]["example_tile"]
+    assert metrics[0]["views"] == metrics[1]["views"]
 
 
 def test_requests_that_tiles_cannot_meet_get_a_sentence(tall, tmp_path):

@@ -177,6 +177,25 @@ def test_points_of_imod_are_voxels_of_the_volume(folder):
     np.testing.assert_allclose(found, (PLACES - SIZE / 2) * PIXEL_A, atol=0.01)
 
 
+def test_points_count_along_the_axes_of_the_tomogram(folder):
+    """Sections go along y with --axes xzy, and rows count down from the upper face."""
+    harness.succeed("reconstruct", "tomograms.star", "-o", "sections_y.mrc", *FIT, "--axes", "xzy", cwd=folder)
+    x, y, z = PLACES.T
+    points = os.path.join(folder, "sections_y.txt")
+    np.savetxt(points, np.column_stack([x + 0.5, THICKNESS - z - 0.5, y]), fmt="%.3f")
+    said = harness.succeed("export", "sections_y.h5", "-o", "cut.mrc", "--overwrite", "--particles", points, "--box", 11,
+                           cwd=folder)
+    assert "along x, z, y" in said.stderr, said.stderr
+    np.testing.assert_allclose(bead_places(read_cut(folder)[0]), 5, atol=0.35)
+
+
+def test_a_model_of_a_given_pixel_size_knows_that_of_its_series(folder):
+    harness.succeed("reconstruct", "tomograms.star", "-o", "coarse.mrc", *FIT, "--angpix", 2 * PIXEL_A, cwd=folder)
+    said = harness.succeed("export", "coarse.h5", "-o", "cut.mrc", "--overwrite", "--particles",
+                           write_particles(folder), "--box", 8, "--tomogram", "TS_01", cwd=folder)
+    assert "states pixels" not in said.stderr, said.stderr
+
+
 def test_particles_at_the_border_are_cut_and_counted(folder):
     places = np.array([PLACES[2], (1.0, 28.0, 12.0), (36.0, 28.0, 23.0)])
     particles = write_particles(folder, places, optics=False)

@@ -30,6 +30,7 @@
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
 #include "io/is_file.h"
+#include "io/lower_extension.h"
 #include "io/saving/atomic_file.h"
 #include "io/saving/output_folder.h"
 #include "io/saving/output_lock.h"
@@ -102,7 +103,7 @@ void read_config_cell(batch::Series& series, const batch::KnownColumns& known,
 std::vector<batch::Series> read_series(const CLI::App& program, const std::string& list,
                                        base::Faults& faults) {
   const bool is_pattern = !io::is_file(list) && list.find_first_of("*?[") != std::string::npos;
-  const std::string ending = is_pattern ? "" : fs::path(list).extension().string();
+  const std::string ending = is_pattern ? "" : io::lower_extension(list);
   if (ending == ".star") return batch::read_star(list);
   if (ending != ".csv" && ending != ".tsv") return batch::expand_pattern(list);
   const batch::KnownColumns known = known_columns(*program.get_subcommand("reconstruct"));

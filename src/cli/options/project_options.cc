@@ -39,7 +39,8 @@ std::optional<projects::Project> read_project(const CLI::App& command,
        .ignored = option_table::split_names(choices.options.views.ignore),
        .series = series.count() == 0 ? "" : series.results().front(),
        .has_mdoc = choices.files.mdoc.has_value(),
-       .has_transfer = choices.options.views.defocus_um || choices.files.ctf});
+       .has_transfer = choices.options.views.defocus_um || choices.files.ctf,
+       .pixel_size_A = choices.options.views.pixel_size_A});
 }
 
 void print_setting(const Setting& setting, std::string_view remark) {

@@ -182,9 +182,17 @@ ParticleList read_points(const fs::path& path, const fs::path& model_file,
   list.optics = {"optics", {kOpticsGroup, "rlnOpticsGroupName", kSeriesPixel}};
   list.optics.add_row({"1", name, fmt::format("{:.6f}", unbinned_A)});
   list.table = {"particles", columns};
+  const bool is_xzy = output::axes_of_tomogram(model) == VolumeAxes::kXzy;
+  if (is_xzy)
+    base::log_info(fmt::format(
+        "'{}' counts along x, z, y, as the tomogram was written (--axes xzy)", path.string()));
+  const double thickness = model.geometry.thickness, nz = std::floor(thickness);
   for (const io::FiducialPoint& point : io::read_fiducial_points(path, "particles")) {
+    // The rows of a section along y count down from the upper face.
+    const double y = is_xzy ? point.section + 0.5 : point.y_px;
+    const double z = is_xzy ? nz - point.y_px : point.section + 0.5;
     const Point place{static_cast<double>(model.roi.x0) + point.x_px,
-                      static_cast<double>(model.roi.y0) + point.y_px, point.section + 0.5};
+                      static_cast<double>(model.roi.y0) + y, z + (thickness - nz) / 2};
     std::vector<std::string> row{name};
     for (std::size_t a = 0; a < 3; ++a)
       row.push_back(fmt::format(

@@ -35,9 +35,8 @@ struct ParticleList {
 ///   Offsets (rlnOriginXAngst) stay offsets from the centre of the subvolume. Of several
 ///   tomograms (rlnTomoName), that of this name is taken: `tomogram`, or that of the model's file,
 ///   which is empty for a model in memory.
-/// - Any other file is the text that IMOD's model2point writes: x, y, z in voxels of the volume
-/// that
-///   reconstruct wrote, in the order of --axes xyz; the middle of the first voxel is (0.5, 0.5, 0).
+/// - Any other file is the text that IMOD's model2point writes: places in voxels of the volume that
+///   reconstruct wrote, in the order of its axes; the middle of the first voxel is (0.5, 0.5, 0).
 ParticleList read_particle_list(const std::filesystem::path& path,
                                 const std::filesystem::path& model_file,
                                 const output::ModelInfo& model, const std::string& tomogram);

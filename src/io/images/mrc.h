@@ -49,8 +49,9 @@ struct MrcHeader {
   /// Says for messages what the header states twice and differently, or that cannot be: "pixels in
   /// Å of 7 in section 2, and of 3.5 in the first, which is taken".
   std::vector<std::string> differences;
-  bool is_ctf_corrected = false;  ///< IMOD's flag of a stack that went through ctfphaseflip
-  bool has_pieces = false;        ///< by the extended header: sections are the pieces of montages
+  bool is_ctf_corrected = false;   ///< IMOD's flag of a stack that went through ctfphaseflip
+  bool has_rows_from_top = false;  ///< for IMOD alone: FEI's files that it has not written again
+  bool has_pieces = false;         ///< by the extended header: sections are the pieces of montages
   std::vector<std::string> labels;
 };
 

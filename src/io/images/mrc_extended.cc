@@ -291,6 +291,7 @@ ExtendedRecords find_extended_records(const MrcHeaderBytes& bytes, const MrcHead
   const std::int64_t first = number_at<std::int16_t>(bytes, kFirstShort, header.is_byte_swapped);
   const std::int64_t second = number_at<std::int16_t>(bytes, kSecondShort, header.is_byte_swapped);
   const std::string& type = header.extended_header_type;
+  const bool is_of_fei = !header.labels.empty() && header.labels.front().starts_with("Fei ");
   const auto fits = [&](std::int64_t record) {
     return record > 0 && record * header.nz <= header.extended_header_bytes;
   };
@@ -307,13 +308,19 @@ ExtendedRecords find_extended_records(const MrcHeaderBytes& bytes, const MrcHead
             .flags = static_cast<int>(second) & ((1 << count) - 1)};
   }
   if ((!type.empty() && type != "AGAR") || first < 0 || second < 1) return {};
-  const std::int64_t record = 4 * (first + second);
+  // FEI's first programs wrote the bytes of a record in place of the number of integers, which is 0
+  // (IMOD's mrc_head_read, IIUNIT_NINT_BUG).
+  constexpr std::int64_t kFeiFloats = 32, kFeiRecord = 128, kFeiBytes = 131072;
+  const bool has_bytes_of_record = first == kFeiRecord && second == kFeiFloats &&
+                                   (is_of_fei || header.extended_header_bytes == kFeiBytes);
+  const std::int64_t num_integers = has_bytes_of_record ? 0 : first;
+  const std::int64_t record = 4 * (num_integers + second);
   if (!fits(record)) return {};
   return {.layout = ExtendedLayout::kFloats,
           .bytes_per_section = record,
-          .first_float = 4 * first,
+          .first_float = 4 * num_integers,
           .num_floats = second,
-          .is_fei = !header.labels.empty() && header.labels.front().starts_with("Fei ")};
+          .is_fei = is_of_fei};
 }
 
 void read_extended_records(std::span<const std::byte> extended, const ExtendedRecords& records,

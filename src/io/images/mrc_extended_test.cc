@@ -100,6 +100,11 @@ TEST(Mrc, FloatRecordsOfExtendedHeaders) {
   EXPECT_EQ(xplore.extended_tilt_deg, tilts);
   EXPECT_NEAR(xplore.voxel_size_A[0], 3.5, 1e-6);
   EXPECT_EQ(xplore.extended_axis_deg, 86.25);  // IMOD turns the sign of FEI's
+  // FEI's first programs stated the bytes of a record.
+  EXPECT_EQ(
+      header_with_extended(float_records(0, 32, -86.25f, 3.5e-10f), no_type, 128, 32, "Fei Company")
+          .extended_tilt_deg,
+      tilts);
   const MrcHeader agard = header_with_extended(float_records(2, 12, 86.25f, 3.5f), "AGAR", 2, 12);
   EXPECT_EQ(agard.extended_tilt_deg, tilts);
   EXPECT_NEAR(agard.voxel_size_A[0], 3.5, 1e-6);

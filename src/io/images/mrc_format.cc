@@ -182,6 +182,14 @@ bool has_imod_origin(const Fields& fields, const MrcHeader& header) {
       header.labels, [](const std::string& label) { return label.starts_with("tomofield "); });
 }
 
+// Tells whether IMOD takes the first row for the uppermost (mrc_head_read, IIUNIT_Y_INVERTED).
+bool has_rows_from_top(const Fields& fields, const MrcHeader& header) {
+  constexpr std::int32_t kFirstVersion = 20140;
+  const std::string& type = header.extended_header_type;
+  return (type == "FEI1" || type == "FEI2") && fields.int32(kVersion) == kFirstVersion &&
+         fields.int32(kImodStamp) != kImodStampValue;
+}
+
 template <typename T>
 void put(MrcHeaderBytes& bytes, std::size_t offset, std::type_identity_t<T> value) {
   std::memcpy(bytes.data() + offset, &value, sizeof value);
@@ -243,6 +251,7 @@ MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name
                     name, header.extended_header_bytes));
   }
   if (header.extended_header_bytes > 0) header.extended_header_type = fields.text(kExtendedType, 4);
+  header.has_rows_from_top = has_rows_from_top(fields, header);
   const int num_labels = std::clamp(fields.int32(kNumLabels), 0, kMaxLabels);
   for (int i = 0; i < num_labels; ++i) {
     header.labels.push_back(

@@ -30,6 +30,12 @@ std::optional<fs::path> look_for(const fs::path& name, const fs::path& list) {
   return found ? std::optional(found->lexically_normal()) : std::nullopt;
 }
 
+// Looks for an image of Warp, whose names begin in the folder of the table, before that elsewhere.
+std::optional<fs::path> look_for_of_warp(const fs::path& name, const fs::path& list) {
+  const fs::path beside = (list.parent_path() / name).lexically_normal();
+  return is_file(beside) ? std::optional(beside) : look_for(name, list);
+}
+
 // Returns the name of the image that a row means.
 std::string image_of(const ViewTable& table, std::size_t row, Frames frames) {
   const ListedView& view = table.views[row];
@@ -52,10 +58,10 @@ fs::path average_of(const fs::path& movie, Frames frames) {
 ImageInFile place_of_movie(const ViewTable& table, std::size_t row, Frames frames) {
   const fs::path movie = table.views[row].image;
   const fs::path average = average_of(movie, frames);
-  if (const auto found = look_for(average, table.file)) return {*found, std::nullopt};
+  if (const auto found = look_for_of_warp(average, table.file)) return {*found, std::nullopt};
   const bool may_be_image = frames == Frames::kAll && movie.extension() == ".mrc";
   if (may_be_image) {
-    if (const auto found = look_for(movie, table.file)) return {*found, std::nullopt};
+    if (const auto found = look_for_of_warp(movie, table.file)) return {*found, std::nullopt};
   }
   throw Error(fmt::format(
       "'{}', row {}: the aligned average '{}' of '{}' was found neither from the current folder "

@@ -120,6 +120,13 @@ TEST(ViewImages, OfWarpAreTheAveragesBesideTheMovies) {
   };
   EXPECT_EQ(first_pixel(""), 1.0f);
   EXPECT_EQ(first_pixel("even@"), 2.0f);
+  // The current folder may be that of another project.
+  const std::filesystem::path before = std::filesystem::current_path();
+  stack(scratch / "other/frames/average/a.mrc", 1, 3.0f);
+  std::filesystem::create_directories(scratch / "other/tomostar");
+  std::filesystem::current_path(scratch / "other/tomostar");
+  EXPECT_EQ(first_pixel(""), 1.0f);
+  std::filesystem::current_path(before);
   expect_parts(message_of<Error>([&] { first_pixel("odd@"); }),
                {"a.tomostar", "row 1", "average/odd/a.mrc", "--out_average_halves"});
 }

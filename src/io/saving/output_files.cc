@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "io/images/view_images.h"
+#include "io/lower_extension.h"
 #include "io/saving/file_identity.h"
 #include "io/saving/output_target.h"
 #include "io/tables/mdoc_images.h"
@@ -108,14 +109,17 @@ void check_output_files(const std::vector<fs::path>& results, const std::vector<
 }
 
 void require_volume_name(const std::filesystem::path& volume) {
-  std::string extension = volume.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string extension = lower_extension(volume);
   for (const char* other : {".tif", ".tiff", ".h5", ".hdf", ".hdf5", ".em", ".dm4", ".nii", ".npy",
                             ".zarr", ".json", ".html", ".png", ".jpg", ".jpeg"})
     if (extension == other)
       throw Error(fmt::format(
           "the volume is an MRC file, and '{}' ends in {}: give a name in .mrc, .rec or .map",
           volume.string(), other));
+  if (extension.size() > 1 && std::isdigit(static_cast<unsigned char>(extension[1])) != 0)
+    throw Error(
+        fmt::format("'{0}' would name its other results as if '{1}' were an ending: give '{0}.mrc'",
+                    volume.string(), extension));
 }
 
 std::vector<fs::path> input_files(const SeriesFiles& input) {

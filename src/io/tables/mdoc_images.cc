@@ -11,6 +11,7 @@
 #include <system_error>
 #include <vector>
 
+#include "io/lower_extension.h"
 #include "io/tables/alignment_files.h"
 #include "tomofield/error.h"
 
@@ -21,10 +22,7 @@ namespace {
 
 bool is_image(const fs::path& path) {
   constexpr std::array<std::string_view, 3> kExtensions{".mrc", ".tif", ".tiff"};
-  std::string extension = path.extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::ranges::find(kExtensions, extension) != kExtensions.end();
+  return std::ranges::find(kExtensions, lower_extension(path)) != kExtensions.end();
 }
 
 // Returns the images in a folder, sorted by name.

@@ -266,6 +266,7 @@ RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
     tomogram.defocus_hand = defocus_hand_of(row.find_number("rlnTomoHand"), where);
     tomogram.defocus_slope = row.find_number("rlnTomoDefocusSlope");
     tomogram.optics = optics_by([&](const char* column) { return row.find_number(column); });
+    tomogram.recorded_pixel_A = row.find_number("rlnMicrographOriginalPixelSize");
     tomogram.mtf = row.find_text("rlnMtfFileName").value_or("");
     tomogram.not_applied = distortions_of({table, 1}, i);
     tomogram.size_px = size_of(row, where);

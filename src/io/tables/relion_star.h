@@ -20,6 +20,7 @@ struct RelionTomogram {
   std::optional<int> defocus_hand;      ///< as in a ViewTable
   std::optional<double> defocus_slope;  ///< of the same with the height; 1: as it is
   StatedOptics optics;
+  std::optional<double> recorded_pixel_A;  ///< for which that of the detector counts
   std::string mtf;  ///< the file of the detector's transfer function, or empty
   std::optional<std::array<std::int64_t, 3>> size_px;  ///< unbinned
   std::vector<std::string> not_applied{};  ///< distortions that its row states, for messages

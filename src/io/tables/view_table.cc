@@ -7,20 +7,11 @@
 #include <set>
 #include <string_view>
 
+#include "io/lower_extension.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
-namespace {
-
-std::string extension_of(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
-
-}  // namespace
 
 double distance_from_middle_px(CentreRule rule, std::int64_t num_pixels) {
   const auto size = static_cast<double>(num_pixels);
@@ -49,7 +40,7 @@ bool has_defocus(const ViewTable& table) {
 }
 
 bool is_view_table(const std::filesystem::path& path) {
-  const std::string extension = extension_of(path);
+  const std::string extension = lower_extension(path);
   return extension == ".star" || extension == ".tomostar" || extension == ".xml";
 }
 
@@ -62,7 +53,7 @@ std::filesystem::path without_half(const std::filesystem::path& path) {
 
 ViewTable read_view_table(const std::filesystem::path& table_or_half) {
   const std::filesystem::path path = without_half(table_or_half);
-  const std::string extension = extension_of(path);
+  const std::string extension = lower_extension(path);
   ViewTable table = extension == ".tomostar" ? read_warp_tomostar(path)
                     : extension == ".xml"    ? read_warp_xml(path)
                                              : read_relion_views(path);
