@@ -127,7 +127,9 @@ TEST(Jobs, GoOnFromNewerFilesAlone) {
   const auto write = [&](const char* name, std::chrono::seconds later) {
     std::filesystem::last_write_time(scratch.write(name, ""), now + later);
   };
-  const Job job{.name = "a", .output = scratch / "a.mrc", .replaces = true};
+  Job job;
+  job.output = scratch / "a.mrc";
+  job.replaces = true;
   write("a.h5", std::chrono::seconds(0));
   write("a_tiles.h5", std::chrono::seconds(5));
   const State before{.progress = Progress::kRunning,

@@ -74,10 +74,13 @@ fs::path command_file_beside(const fs::path& tilt_com, std::string_view program)
   const auto beside = [&](const std::string& end) {
     return tilt_com.parent_path() / (std::string(program) + end);
   };
-  // A copy, tilt_thick.com or tilta_thick.com, may have no files of its own.
-  const std::size_t own_name = axis.find('_');
-  if (own_name > 1 || io::is_file(beside(axis))) return beside(axis);
-  return beside(axis.substr(0, own_name) + ".com");
+  if (axis == ".com" || axis == "a.com" || axis == "b.com" || io::is_file(beside(axis)))
+    return beside(axis);
+  // A copy, tilt_thick.com, tilt2.com or tilta_thick.com, has no files of its own.
+  const bool has_letter = axis.size() > 1 && (axis[0] == 'a' || axis[0] == 'b') &&
+                          std::isalpha(static_cast<unsigned char>(axis[1])) == 0;
+  const fs::path of_axis = beside(axis.substr(0, has_letter ? 1 : 0) + ".com");
+  return io::is_file(of_axis) ? of_axis : beside(".com");
 }
 
 CommandEntries::CommandEntries(Project& project, const fs::path& file, std::string_view program)

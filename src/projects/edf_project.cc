@@ -164,7 +164,12 @@ void set_dataset(Project& project, const fs::path& edf, const Entries& entries,
 // Throws Error if tilt.com is of another dataset.
 void require_same_dataset(const Project& project, const fs::path& edf, const std::string& name) {
   const fs::path stack = project.value_of("stack");
-  if (stack.filename().string().starts_with(name)) return;
+  std::string rest = stack.filename().string();
+  if (rest.starts_with(name)) {
+    rest.erase(0, name.size());
+    if (rest.starts_with('a') || rest.starts_with('b')) rest.erase(0, 1);  // one of two axes
+    if (name.empty() || rest.empty() || rest[0] == '.' || rest[0] == '_') return;
+  }
   throw Error(
       fmt::format("'{}' is of the dataset '{}', and the tilt.com beside it reads '{}': give the "
                   "tilt.com or the stack that you mean",

@@ -231,8 +231,10 @@ TEST(ImodProject, ACopyHasTheFilesOfTheFirst) {
   const ImodFolder imod;
   imod.write_newst("BinByFactor 2\n");
   imod.write_tilt("IMAGEBINNED 2\n");
-  for (const auto& [copy, newst] :
-       {std::pair("tilt_thick.com", "newst.com"), {"tilta_thick.com", "newsta.com"}}) {
+  for (const auto& [copy, newst] : {std::pair("tilt_thick.com", "newst.com"),
+                                    {"tilt2.com", "newst.com"},
+                                    {"tilt-thick.com", "newst.com"},
+                                    {"tilta_thick.com", "newsta.com"}}) {
     std::filesystem::copy_file(imod.folder / "tilt.com", imod.folder / copy);
     if (!std::filesystem::exists(imod.folder / newst))
       std::filesystem::copy_file(imod.folder / "newst.com", imod.folder / newst);
@@ -250,9 +252,11 @@ TEST(ImodProject, StacksOfOtherSeriesAreNamed) {
   imod.write_tilt("");
   expect_parts(imod.warnings(), {"TS_02_ali.mrc", "TS_ali.mrc"});
   EXPECT_EQ(imod.warnings({"OutputFile"}), "");
-  const auto edf = imod.folder.write("TS_02.edf", "Setup.DatasetName=TS_02\n");
-  expect_parts(message_of<Error>([&] { read_project({.path = edf}); }),
-               {"TS_02.edf", "'TS_02'", "TS.st"});
+  for (const std::string name : {"TS_02", "T"}) {
+    const auto edf = imod.folder.write(name + ".edf", "Setup.DatasetName=" + name + "\n");
+    expect_parts(message_of<Error>([&] { read_project({.path = edf}); }),
+                 {name + ".edf", "'" + name + "'", "TS.st"});
+  }
 }
 
 TEST(ImodProject, DirectionsOfAstigmatismHoldForTheRawStack) {

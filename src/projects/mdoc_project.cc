@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "io/is_file.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/mdoc_images.h"
 #include "projects/formats.h"
@@ -54,7 +55,8 @@ void read_mdoc_project(Project& project) {
   }
   project.set("--mdoc", mdoc.string(), mdoc, "ZValue");
   fs::path stem = mdoc.stem();
-  if (has_extension_of_stack(stem)) stem = stem.stem();  // "TS_01" of "TS_01.mrc.mdoc"
+  // "TS_01" of "TS_01.mrc.mdoc"; the part after a point may belong to the name.
+  if (has_extension_of_stack(stem) || io::is_file(mdoc.parent_path() / stem)) stem = stem.stem();
   if (!set_transfer_files(project, mdoc.parent_path(), stem.string()))
     set_target_defocus(project, mdoc, contents);
   if (contents.voltage_kV)

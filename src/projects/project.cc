@@ -25,12 +25,14 @@ struct MainFile {
   fs::path path;
 };
 
-// Tells whether a file has the word of its format. One that cannot be read may: the error says so
-// when it is read.
+// Tells whether a file has the word of its format, in UTF-8 or UTF-16. One that cannot be read may:
+// the error says so when it is read.
 bool has_word(const fs::path& path, std::string_view word) {
   if (word.empty()) return true;
   try {
-    return io::read_small_file(path).find(word) != std::string::npos;
+    std::string text = io::read_small_file(path);
+    std::erase(text, '\0');
+    return text.find(word) != std::string::npos;
   } catch (const Error&) {
     return true;
   }

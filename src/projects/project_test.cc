@@ -130,6 +130,10 @@ TEST(MdocProject, NamesMayHavePoints) {
     EXPECT_EQ(read_project({.path = mdoc})->value_of("--ctf"),
               (folder / "lam1.2_ctf.txt").string());
   }
+  write_stack(folder / "TS.map", 16, 12, 1, some_value);
+  folder.write("TS_ctf.txt", row);
+  const auto mdoc = folder.write("TS.map.mdoc", "[ZValue = 0]\nTiltAngle = 1\n");
+  EXPECT_EQ(read_project({.path = mdoc})->value_of("--ctf"), (folder / "TS_ctf.txt").string());
 }
 
 TEST(MdocProject, FindsTheStackOrTheImages) {

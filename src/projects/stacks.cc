@@ -10,6 +10,7 @@
 #include "io/images/mrc.h"
 #include "io/images/mrc_format.h"
 #include "io/is_file.h"
+#include "io/lower_extension.h"
 #include "tilt_series/contradictions.h"
 #include "tilt_series/series_plan.h"
 #include "tomofield/error.h"
@@ -45,7 +46,7 @@ std::optional<fs::path> find_stack_beside(const fs::path& file, const std::strin
 }
 
 bool has_extension_of_stack(const fs::path& name) {
-  return std::ranges::count(kExtensions, name.extension()) > 0;
+  return std::ranges::count(kExtensions, io::lower_extension(name)) > 0;
 }
 
 bool are_other_pixels(double stated_A, double in_header_A) {

@@ -89,10 +89,8 @@ class BesideField {
     low_ = {static_cast<double>(roots.x0), static_cast<double>(roots.y0), 0.0};
     const auto side = static_cast<double>(roots.cell_size);
     high_ = {low_[0] + roots.columns * side, low_[1] + roots.rows * side, field.thickness()};
-    for (const std::size_t a : {0, 1}) {
-      low_[a] += kPixelCentre;
-      high_[a] += kPixelCentre;
-    }
+    // The domain begins with a root cell's first pixel, and faces lie on centres of pixels.
+    for (const std::size_t a : {0, 1}) high_[a] += kPixelCentre;
   }
   bool operator()(std::int64_t x, std::int64_t y, std::int64_t z) const {
     const Point middle = box_.position(

@@ -85,6 +85,13 @@ TEST_P(EachBoxedField, TurnedBoxesAreTheDensity) {
       sum += densities[index(points, 3 * x + p % 3, 3 * y + p / 3 % 3, 3 * z + p / 9)];
     means.push_back(sum / 27);
   }
+  OrientedBox fine{.centre_px = {-60, 4, 5},  // a corner of the domain
+                   .size = {20, 20, 10},
+                   .voxel_px = 0.1,
+                   .field_from_box = rotation_from_euler(90, 0, 0)};
+  testing::expect_near(sample_box(*model.field, fine), point_by_point(*model.field, fine), 3e-6);
+  fine.centre_px = {196, 132, 20};  // the opposite one
+  testing::expect_near(sample_box(*model.field, fine), point_by_point(*model.field, fine), 3e-6);
   EXPECT_GT(std::ranges::count(means, 0.0), std::ssize(means) / 2);
   EXPECT_LT(std::ranges::count(means, 0.0), std::ssize(means));
   testing::expect_near(sample_box(*model.field, box), means, 3e-6);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "expect_parts.h"
+#include "scratch_directory.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
