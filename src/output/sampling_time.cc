@@ -104,10 +104,10 @@ double seconds_a_point(const Model& model, const BoxBounds& bounds, const Orient
   return taken.count() / std::max(1.0, points_in_model(bounds, part));
 }
 
-// What is known of boxes that are sampled.
+// Tells how many points some boxes have in the model, and which box has the most.
 struct Work {
-  double points = 0.0;              // in the model
-  const OrientedBox* fullest = {};  // the box with the most of them
+  double points = 0.0;
+  const OrientedBox* fullest = {};
 };
 
 Work work_of(const BoxBounds& model, std::span<const OrientedBox> boxes) {

@@ -109,6 +109,7 @@ class BesideField {
 // Returns the mean density of a voxel's points.
 double voxel_density(const Field& field, const OrientedBox& box, std::int64_t x, std::int64_t y,
                      std::int64_t z) {
+  constexpr std::int64_t kManyPoints = 16;  // along an axis: rows of such voxels take long
   const std::int64_t factor = points_per_voxel(box);
   const auto along = [factor](std::int64_t voxel, std::int64_t point) {
     return static_cast<double>(voxel) +
@@ -116,7 +117,7 @@ double voxel_density(const Field& field, const OrientedBox& box, std::int64_t x,
   };
   double sum = 0.0;
   for (std::int64_t k = 0; k < factor; ++k) {
-    base::allow_interruption();
+    if (factor >= kManyPoints) base::allow_interruption();
     for (std::int64_t j = 0; j < factor; ++j) {
       for (std::int64_t i = 0; i < factor; ++i) {
         const Point at = box.position({along(x, i), along(y, j), along(z, k)});
