@@ -53,8 +53,10 @@ double sure_angle(double angle_deg, double error_deg) {
 }
 
 // Throws Error if an alignment is of another series than a model: it was made from something else
-// than the alignment before the fit, or has no view at an angle of the model.
-void require_own(const ModelInfo& model, const alignment::AlignmentRecord& record) {
+// than the alignment before the fit, or has no view at an angle of the model. Warns if the model
+// was not aligned before the fit.
+void require_own(const ModelInfo& model, const alignment::AlignmentRecord& record,
+                 const std::filesystem::path& path) {
   constexpr double kSame_deg = 0.02;  // angles are written with some digits
   if (!model.alignment_json.empty()) {
     const auto own = alignment::origin_from_text(model.alignment_json);
@@ -73,6 +75,11 @@ void require_own(const ModelInfo& model, const alignment::AlignmentRecord& recor
           "it is of another series: the model has a view at {:.2f}°, and this alignment has none",
           tilt_deg));
   }
+  base::log_warning(
+      fmt::format("the model was not aligned by '{}', which --align wrote for the same tilts: it "
+                  "is levelled as "
+                  "if it was of its views (--level PITCH,X_TILT gives other angles)",
+                  path.string()));
 }
 
 // Says which angles the alignment found, and warns if they are hard to believe.
@@ -100,7 +107,7 @@ Levelling found_levelling(const ModelInfo& model, const std::filesystem::path& f
   }
   try {
     const alignment::AlignmentRecord record = alignment::read_record(path);
-    require_own(model, record);
+    require_own(model, record, path);
     if (!record.pose) throw Error("the views could not tell the pitch");
     const auto& [pose, error] = *record.pose;
     const Levelling found{.pitch_deg = sure_angle(pose.pitch_deg, error.pitch_deg),

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <string>
@@ -64,8 +65,9 @@ std::optional<ImageRotation> find_rotation(Project& project, const fs::path& edf
       entries.contains("Setup.ImageRotationA") ? "Setup.ImageRotationA" : "Setup.ImageRotation";
   const std::string text = value_of(entries, entry);
   if (text.empty() || project.ignores(entry)) return std::nullopt;
-  if (const auto axis_deg = io::parse_number(text, base::kLargestAngle_deg / 2))
-    return ImageRotation{entry, *axis_deg};
+  constexpr double kWholeTurn_deg = 360.0;
+  if (const auto axis_deg = io::parse_number(text, base::kLargestAngle_deg))
+    return ImageRotation{entry, std::remainder(double{*axis_deg}, kWholeTurn_deg)};
   throw Error(
       fmt::format("'{}': {} is '{}', which is no angle of a tilt axis: correct it, or go "
                   "on with --ignore {}",

@@ -123,32 +123,43 @@ void warn_of_corrections(Project& project, const fs::path& aligned) {
   }
 }
 
+// By how much newstack reduces the views. Without an entry it does not.
+struct Reduction {
+  const char* entry = "BinByFactor";
+  double factor = 1.0;
+};
+
+// Returns what newst.com says of it; nothing if the user ignores it.
+std::optional<Reduction> find_reduction(Project& project, CommandEntries& newst) {
+  for (const char* entry : {"BinByFactor", "ShrinkByFactor"})
+    if (const auto factor = newst.number(entry)) return Reduction{entry, *factor};
+  const bool is_ignored = project.ignores("BinByFactor") || project.ignores("ShrinkByFactor");
+  return is_ignored ? std::nullopt : std::optional(Reduction{});
+}
+
 // Returns the binning of the aligned stack. Throws Error if the two command files differ.
 double find_bin(Project& project, CommandEntries& tilt, CommandEntries* newst, bool is_raw) {
   const auto of_tilt = tilt.number("IMAGEBINNED");
-  auto of_newst = newst == nullptr ? std::nullopt : newst->number("BinByFactor");
-  constexpr double kBinOfNewstack = 1.0;  // without the entry
-  if (newst != nullptr && !of_newst && of_tilt && !project.ignores("BinByFactor"))
-    of_newst = kBinOfNewstack;
-  if (!of_tilt && of_newst.value_or(1.0) != 1.0 && !project.ignores("IMAGEBINNED"))
+  const auto of_newst = newst == nullptr ? std::nullopt : find_reduction(project, *newst);
+  if (!of_tilt && of_newst && of_newst->factor != 1.0 && !project.ignores("IMAGEBINNED"))
     throw Error(fmt::format(
-        "'{0}' has BinByFactor {1}, and '{2}' no IMAGEBINNED, so that tilt counts lengths in "
-        "binned "
+        "'{0}' has {3} {1}, and '{2}' no IMAGEBINNED, so that tilt counts lengths in binned "
         "pixels: write IMAGEBINNED {1} and lengths in unbinned pixels into it, or go on with "
         "--ignore IMAGEBINNED if they are that",
-        newst->file().string(), *of_newst, tilt.file().string()));
-  if (of_tilt && of_newst && *of_tilt != *of_newst) {
+        newst->file().string(), of_newst->factor, tilt.file().string(), of_newst->entry));
+  if (of_tilt && of_newst && *of_tilt != of_newst->factor) {
     throw Error(fmt::format(
-        "'{}' has BinByFactor {} and '{}' IMAGEBINNED {}, so lengths cannot be told: align the "
-        "stack again in eTomo, or go on with --ignore BinByFactor or --ignore IMAGEBINNED",
-        newst->file().string(), *of_newst, tilt.file().string(), *of_tilt));
+        "'{0}' has {4} {1} and '{2}' IMAGEBINNED {3}, so lengths cannot be told: align the stack "
+        "again in eTomo, or go on with --ignore {4} or --ignore IMAGEBINNED",
+        newst->file().string(), of_newst->factor, tilt.file().string(), *of_tilt, of_newst->entry));
   }
-  const double bin = of_newst.value_or(of_tilt.value_or(1.0));
+  const double bin = of_newst ? of_newst->factor : of_tilt.value_or(1.0);
   if (!(bin >= 1))
     throw Error(fmt::format("'{}': binning by {} is not 1 or more", tilt.file().string(), bin));
-  if (is_raw && (of_newst || of_tilt)) {
-    project.set("--bin", fmt::format("{}", bin), of_newst ? newst->file() : tilt.file(),
-                of_newst ? "BinByFactor" : "IMAGEBINNED");
+  if (is_raw && (of_tilt || bin != 1.0)) {
+    const bool is_of_newst = of_newst.has_value();
+    project.set("--bin", fmt::format("{}", bin), is_of_newst ? newst->file() : tilt.file(),
+                is_of_newst ? of_newst->entry : "IMAGEBINNED");
   }
   return bin;
 }

@@ -227,6 +227,17 @@ TEST(ImodProject, BinningsThatDiffer) {
   EXPECT_EQ(imod.values({"IMAGEBINNED"}).at("--bin"), "4");
 }
 
+TEST(ImodProject, AShrunkStackIsAsLargeAsABinnedOne) {
+  const ImodFolder imod;
+  imod.write_newst("ShrinkByFactor 2\n");
+  imod.write_tilt("IMAGEBINNED 2\nTHICKNESS 80\n");
+  write_stack(imod.folder / "TS_ali.mrc", 30, 20, 5, some_value);
+  expect_parts(imod.warnings(), {"ShrinkByFactor", "aligned stack is read"});
+  EXPECT_EQ(imod.values().at("--thickness"), "40");
+  imod.write_tilt("IMAGEBINNED 4\n");
+  expect_parts(imod.refusal(), {"ShrinkByFactor 2", "IMAGEBINNED 4", "--ignore ShrinkByFactor"});
+}
+
 TEST(ImodProject, ACopyHasTheFilesOfTheFirst) {
   const ImodFolder imod;
   imod.write_newst("BinByFactor 2\n");
@@ -460,8 +471,14 @@ TEST(ImodProject, ThePixelSizeOfTheCommandsIsTakenOrCompared) {
     EXPECT_EQ(imod.refusal(), "") << of_aligned;
     EXPECT_EQ(imod.warnings().find("states pixels of"), std::string::npos) << imod.warnings();
   }
-  write("correction", size(3 * in_header_nm));
-  expect_parts(imod.refusal(), {"ctfcorrection.com", "PixelSize", "ctfplotter.com"});
+  write("correction", size(3 * in_header_nm));  // of an earlier binning
+  EXPECT_EQ(imod.refusal(), "");
+  expect_parts(imod.warnings(),
+               {"ctfcorrection.com", "line 2", "PixelSize", "is not used", "ctfplotter.com"});
+  EXPECT_EQ(imod.warnings({"PixelSize"}).find("is not used"), std::string::npos);
+  write("plotter", size(in_header_nm) + size(2 * in_header_nm));
+  expect_parts(imod.refusal(), {"ctfplotter.com", "line 3", "PixelSize"});
+  write("plotter", size(in_header_nm));
   write("correction", "");
   write("plotter", size(2 * in_header_nm));
   expect_parts(imod.warnings(), {"ctfplotter.com", "states pixels of 5 Å"});

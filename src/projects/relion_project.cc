@@ -131,7 +131,7 @@ void read_relion_project(Project& project) {
   const bool may_transfer = has_transfer || project.request().has_transfer;
   set_stated_optics(project, tomogram.optics, star,
                     {"rlnVoltage", "rlnSphericalAberration", "rlnAmplitudeContrast"}, may_transfer);
-  if (may_transfer) set_detector(project, tomogram, star);
+  if (may_transfer && !project.request().has_detector) set_detector(project, tomogram, star);
   for (const std::string& what : tomogram.not_applied)
     project.warn(fmt::format("'{}', tomogram {}: {}, which is not applied", star.string(),
                              tomogram.name, what));

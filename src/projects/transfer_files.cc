@@ -155,7 +155,8 @@ void set_microscope(Project& project, const CtfCommands& commands, bool has_tran
 
 // Returns the size of unbinned pixels in nm: ctfplotter states that of the raw stack, ctfphaseflip
 // that of the aligned one, and beside it UnbinnedPixelSize. Before eTomo has updated the latter's
-// command file, it has the size of unbinned pixels, too.
+// command file, it has the size of unbinned pixels, too, or that of an earlier binning: then it is
+// not used.
 std::optional<StatedNumber> unbinned_pixel_nm(Project& project, const CtfCommands& commands,
                                               double bin) {
   constexpr double kRounding = 0.01;
@@ -167,7 +168,11 @@ std::optional<StatedNumber> unbinned_pixel_nm(Project& project, const CtfCommand
   const auto& unbinned = of_raw ? of_raw : stated;
   if (unbinned && of_aligned && differ(of_aligned->value, unbinned->value * bin) &&
       differ(of_aligned->value, unbinned->value))
-    of_aligned->refuse_other(*unbinned);
+    project.warn(fmt::format(
+        "'{}', line {}: PixelSize {} is not used, as {} is {} in '{}', line {} (--ignore PixelSize "
+        "says that this is meant)",
+        of_aligned->file.string(), of_aligned->line, of_aligned->value, unbinned->entry,
+        unbinned->value, unbinned->file.string(), unbinned->line));
   if (unbinned) return unbinned;
   if (of_aligned) of_aligned->value /= bin;
   return of_aligned;

@@ -355,6 +355,8 @@ def test_a_dataset_of_etomo():
     assert distances(back_projection(folder, *words)).max() < 0.5
     expect(harness.succeed("info", ".", cwd=folder).stdout, "--tilt-axis 85.3 from", "TS_01.rawtlt")
     edf_text = "Setup.DatasetName=TS_01\nSetup.AxisType=Single Axis\n"
+    write(folder, "TS_01.edf", edf_text + "Setup.ImageRotationA=265\n")
+    expect(harness.succeed("info", ".", cwd=folder).stdout, "--tilt-axis -95 from")
     write(folder, "TS_01.edf", edf_text + "Setup.ImageRotationA=83,9\n")
     expect(dry(folder, "TS_01.edf", status=2), "Setup.ImageRotationA", "83,9")
     write(folder, "TS_01.edf", edf_text + "Setup.ViewType=Montage\n")

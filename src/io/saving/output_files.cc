@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cctype>
+#include <array>
 #include <map>
 #include <system_error>
 #include <utility>
@@ -109,17 +109,12 @@ void check_output_files(const std::vector<fs::path>& results, const std::vector<
 }
 
 void require_volume_name(const std::filesystem::path& volume) {
-  const std::string extension = lower_extension(volume);
-  for (const char* other : {".tif", ".tiff", ".h5", ".hdf", ".hdf5", ".em", ".dm4", ".nii", ".npy",
-                            ".zarr", ".json", ".html", ".png", ".jpg", ".jpeg"})
-    if (extension == other)
-      throw Error(fmt::format(
-          "the volume is an MRC file, and '{}' ends in {}: give a name in .mrc, .rec or .map",
-          volume.string(), other));
-  if (extension.size() > 1 && std::isdigit(static_cast<unsigned char>(extension[1])) != 0)
-    throw Error(
-        fmt::format("'{0}' would name its other results as if '{1}' were an ending: give '{0}.mrc'",
-                    volume.string(), extension));
+  constexpr std::array<std::string_view, 5> kOfMrc{"", ".mrc", ".rec", ".map", ".ccp4"};
+  if (std::ranges::find(kOfMrc, lower_extension(volume)) != kOfMrc.end()) return;
+  throw Error(fmt::format(
+      "the volume is an MRC file, and '{0}' ends in {1}: give a name in .mrc, .rec or .map, for "
+      "example '{0}.mrc'",
+      volume.string(), volume.extension().string()));
 }
 
 std::vector<fs::path> input_files(const SeriesFiles& input) {

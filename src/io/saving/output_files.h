@@ -31,7 +31,8 @@ void check_output_files(const std::vector<std::filesystem::path>& results,
                         const std::vector<std::filesystem::path>& inputs, bool may_replace,
                         const std::string& advice);
 
-/// Throws Error if the name of an MRC volume ends in the extension of another format.
+/// Throws Error unless the name of an MRC volume has an extension of such volumes, or none. The
+/// other results have it without its extension, so that a.1 and a.2 would share them.
 void require_volume_name(const std::filesystem::path& volume);
 
 /// Returns every file that a series is read from, with the images that a table or an .mdoc names.
