@@ -28,6 +28,7 @@
 #include "baseline/method_options.h"
 #include "option_table/rows.h"
 #include "options.h"
+#include "text.h"
 #include "unlocked.h"
 
 namespace tomofield::python {
@@ -121,8 +122,7 @@ auto run_with(py::object callback, const Work& work) {
 void log(MessageKind kind, std::string_view text) {
   const InUserCode locked;
   try {
-    const auto message = py::reinterpret_steal<py::object>(
-        PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "replace"));
+    const py::str message = to_message(text);
     const py::object logger =
         call(py::module_::import("logging").attr("getLogger"), py::str("tomofield"));
     call(logger.attr(kind == MessageKind::kWarning ? "warning" : "info"), message);
@@ -136,9 +136,9 @@ void log(MessageKind kind, std::string_view text) {
 
 // Reads a project, or takes the path of a stack. Returns its choices and its warnings, which go to
 // the logger as well.
-std::pair<option_table::Choices, std::vector<std::string>> open(const std::filesystem::path& path,
-                                                                const std::string& series,
-                                                                const std::string& ignore) {
+std::pair<option_table::Choices, std::vector<py::str>> open(const std::filesystem::path& path,
+                                                            const std::string& series,
+                                                            const std::string& ignore) {
   Project project;
   {
     const Unlocked unlocked;
@@ -146,7 +146,9 @@ std::pair<option_table::Choices, std::vector<std::string>> open(const std::files
     for (const std::string& warning : project.warnings) log(MessageKind::kWarning, warning);
   }
   check_signals();
-  return {{std::move(project.files), std::move(project.options)}, std::move(project.warnings)};
+  std::vector<py::str> warnings;
+  for (const std::string& warning : project.warnings) warnings.push_back(to_message(warning));
+  return {{std::move(project.files), std::move(project.options)}, std::move(warnings)};
 }
 
 bool align_series(const TiltSeries& series, const option_table::Choices& choices,
@@ -411,17 +413,20 @@ void add_evaluate(py::module_& module) {
 
 PYBIND11_MODULE(_core, module) {
   using namespace tomofield;
-  pybind11::register_exception<Error>(module, "Error", PyExc_RuntimeError);
+  pybind11::exception<Error>(module, "Error", PyExc_RuntimeError);
   pybind11::register_exception_translator([](std::exception_ptr raised) {
+    const auto raise = [](const std::string& said) {
+      const auto type = pybind11::module_::import("tomofield._core").attr("Error");
+      PyErr_SetObject(type.ptr(), python::to_message(said).ptr());
+    };
     try {
       if (raised) std::rethrow_exception(raised);
     } catch (const python::InterpreterEnds&) {
       python::InterpreterEnds::raise();
+    } catch (const Error& error) {
+      raise(error.what());
     } catch (const std::filesystem::filesystem_error& error) {
-      const auto type = pybind11::module_::import("tomofield._core").attr("Error");
-      const std::string said =
-          "'" + error.path1().string() + "' cannot be used: " + error.code().message();
-      PyErr_SetString(type.ptr(), said.c_str());
+      raise("'" + error.path1().string() + "' cannot be used: " + error.code().message());
     }
   });
   module.attr("Error").attr("__doc__") =

@@ -16,6 +16,7 @@
 #include "base/enum_names.h"
 #include "base/nearest_names.h"
 #include "option_table/rows.h"
+#include "text.h"
 
 namespace tomofield::python {
 namespace {
@@ -134,7 +135,8 @@ void add_options(py::module_& module) {
   choices.def_property_readonly("settings", [](const Choices& c) {
     py::list settings;
     for (const Setting& s : c.options.settings)
-      settings.append(py::make_tuple(s.option, s.value, s.file, s.entry, s.row));
+      settings.append(py::make_tuple(s.option, to_name(s.value), s.file, to_message(s.entry),
+                                     to_message(s.row)));
     return settings;
   });
   py::list files;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "base/system/memory.h"
 #include "io/images/mrc_format.h"
 #include "tomofield/error.h"
 
@@ -32,6 +33,9 @@ std::string to_text(const base::Box& box) {
 }
 
 base::Volume read_box(const io::MrcReader& file, const base::Box& box) {
+  base::require_memory(box.shape().voxels() * sizeof(float),
+                       fmt::format("'{}' in memory", file.path().string()).c_str(),
+                       "bin it, or cut a part out of it");
   base::Volume volume(box.shape(), io::cubic_voxel_size_A(file.header(), file.path()));
   io::warn_of_mode(file.header(), file.path().string());
   const base::Shape3& shape = volume.shape;

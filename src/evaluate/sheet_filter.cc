@@ -10,6 +10,7 @@
 
 #include "base/check.h"
 #include "base/gaussian_kernel.h"
+#include "base/system/memory.h"
 #include "base/threads/parallel.h"
 #include "base/utf8.h"
 #include "io/images/mrc_format.h"
@@ -122,6 +123,10 @@ DetectionScore membrane_score(const base::Volume& volume, const base::Volume& la
                     "1 where there is membrane and 0 elsewhere",
                     num_bad));
   }
+  // The blurred volume, the response, and both once more with the label, which are sorted.
+  constexpr std::size_t kBytesOfVoxel = 2 * sizeof(float) + sizeof(Detection);
+  base::require_memory(kBytesOfVoxel * label.shape.voxels(), "the filter for sheets",
+                       "bin both volumes, or cut a part out of both");
   const double sigma_px = kSheetSigma_A / label.voxel_size_A;
   const auto longest_px =
       static_cast<double>(std::max({label.shape.nx, label.shape.ny, label.shape.nz}));

@@ -133,9 +133,13 @@ RowOfSection rows_of_whole_table(const Sections& sections, const RowsOfViews& ta
   const bool has_other_sign = !tilt_series::are_other_angles(sections.tilt_deg, negated);
   const auto by_tilt = has_other_sign ? std::nullopt : rows_by_tilt(sections, table);
   if (by_tilt) {
-    base::log_info(fmt::format(
+    const std::string text = fmt::format(
         "'{}' lists the views in another order than '{}': its rows are matched by their tilts",
-        table.file.string(), sections.stack));
+        table.file.string(), sections.stack);
+    if (table.is_ctf)
+      base::log_warning(text + "; check that the angles in use are in the order of the sections");
+    else
+      base::log_info(text);
     return *by_tilt;
   }
   if (table.is_ctf)

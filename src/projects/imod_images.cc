@@ -21,11 +21,12 @@ using io::is_file;
 namespace {
 
 // With these entries of newst.com the aligned stack is more than the transforms of the raw one.
-constexpr std::array<std::string_view, 14> kBeyondTransforms{
-    "DistortionField", "GradientFile",          "ExpandByFactor",    "ShrinkByFactor",
-    "RotateByAngle",   "SectionsToRead",        "ExcludeSections",   "UseTransformLines",
-    "FileOfInputs",    "SkipSectionIncrement",  "ApplyOffsetsFirst", "OneTransformPerFile",
-    "WarpingFile",     "TwoDirectionTiltSeries"};
+constexpr std::array<std::string_view, 19> kBeyondTransforms{
+    "DistortionField", "GradientFile",          "ExpandByFactor",         "ShrinkByFactor",
+    "RotateByAngle",   "SectionsToRead",        "ExcludeSections",        "UseTransformLines",
+    "FileOfInputs",    "ApplyOffsetsFirst",     "OneTransformPerFile",    "SkipSectionIncrement",
+    "WarpingFile",     "ReorderByTiltAngle",    "TwoDirectionTiltSeries", "ReplaceSections",
+    "BlankOutput",     "ReverseInputFileOrder", "NumberToOutput"};
 
 // These make no difference to views that this program aligns itself, or to where they lie. It masks
 // what IMOD fills and tapers.

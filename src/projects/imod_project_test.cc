@@ -88,6 +88,17 @@ TEST(ImodProject, IgnoringTheTransformsTakesTheAlignedStack) {
   EXPECT_EQ(imod.values({"TransformFile"}).at("stack"), (imod.folder / "TS_ali.mrc").string());
 }
 
+TEST(ImodProject, AStackWithOtherSectionsThanTheRawOneIsRead) {
+  const ImodFolder imod;
+  imod.write_tilt("");
+  write_stack(imod.folder / "TS_ali.mrc", 40, 60, 5, some_value);
+  for (const std::string entry : {"ReorderByTiltAngle", "BlankOutput", "ReverseInputFileOrder"}) {
+    imod.write_newst(entry + " 1\n");
+    EXPECT_EQ(imod.values().at("stack"), (imod.folder / "TS_ali.mrc").string()) << entry;
+    expect_parts(imod.warnings(), {entry, "aligned stack is read"});
+  }
+}
+
 TEST(ImodProject, RawFilesAreFoundByTheirUsualNames) {
   const ImodFolder imod;
   imod.write_tilt("IMAGEBINNED 2\n");

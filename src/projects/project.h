@@ -18,6 +18,7 @@ struct Request {
   std::string series = {};                ///< of a project that has several (--series); empty: all
   bool has_mdoc = false;      ///< the user gave --mdoc, so a folder may be that of its images
   bool has_transfer = false;  ///< the user gave a contrast transfer, which optics describe
+  std::string exclude = {};   ///< sections that the user leaves out, as --exclude has them
   bool has_detector = false;  ///< the user gave the detector's transfer, or --ctf none
   std::optional<double> pixel_size_A = {};  ///< that the user gave, if any
 };

@@ -66,11 +66,7 @@ bool set_views(Project& project, const fs::path& views, const fs::path& named_by
   const io::ViewTable table = io::read_view_table(views);
   for (const io::ImageInFile& image : io::find_view_images(table)) project.add_file(image.file);
   project.set("stack", views.string(), named_by, entry, row.name);
-  const bool has_defocus = io::has_defocus(table);
-  if (has_defocus)
-    project.set("--ctf", views.string(), views, "rlnDefocusU");
-  else
-    warn_of_unused_transfer(project, table);
+  const bool has_defocus = set_transfer_of_views(project, table, "rlnDefocusU");
   if (has_defocus || project.request().has_transfer) set_hand(project, table, row, named_by);
   return has_defocus;
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "io/is_file.h"
+#include "io/tables/alignment_files.h"
 #include "io/tables/command_file.h"
 #include "io/tables/mtf_table.h"
 #include "io/tables/text_lines.h"
@@ -270,10 +271,18 @@ bool set_transfer_files(Project& project, const fs::path& folder, const std::str
   return false;
 }
 
-void warn_of_unused_transfer(Project& project, const io::ViewTable& table) {
+bool set_transfer_of_views(Project& project, const io::ViewTable& table, std::string_view entry) {
+  io::ViewTable used = table;
+  const auto count = static_cast<std::int64_t>(table.views.size());
+  for (const std::int64_t section : io::parse_section_list(project.request().exclude, count))
+    used.views[static_cast<std::size_t>(section)].is_used = false;
+  const bool has_defocus = io::has_defocus(used);
+  if (has_defocus) project.set("--ctf", table.file.string(), table.file, entry);
+  if (has_defocus || project.request().has_transfer) return has_defocus;
   for (const std::string& what : table.ctf_not_applied)
     project.warn(fmt::format("'{}' has {}, so its contrast transfer is not applied",
                              table.file.string(), what));
+  return false;
 }
 
 void set_stated_optics(Project& project, const io::StatedOptics& optics, const fs::path& file,

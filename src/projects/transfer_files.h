@@ -21,8 +21,10 @@ bool set_transfer_files(Project& project, const std::filesystem::path& folder,
 bool set_imod_transfer(Project& project, const std::filesystem::path& tilt_com,
                        const std::string& name);
 
-/// Warns that the contrast transfer of a table is not applied, and why, if it has a part of it.
-void warn_of_unused_transfer(Project& project, const io::ViewTable& table);
+/// Sets --ctf to a table of views, by the name of its entry, if every view that is used has a
+/// defocus. Otherwise warns why its contrast transfer is not applied, if it has a part of it and
+/// the user gave no other one. Returns true if it has it.
+bool set_transfer_of_views(Project& project, const io::ViewTable& table, std::string_view entry);
 
 /// The names of the entries of a file that state the microscope.
 struct OpticsEntries {

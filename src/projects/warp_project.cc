@@ -33,11 +33,7 @@ void read_warp_project(Project& project) {
   for (const io::ImageInFile& image : io::find_view_images(table)) project.add_file(image.file);
   const bool is_xml = path.extension() != ".tomostar";
   project.set("stack", path.string(), path, is_xml ? "MoviePath" : "wrpMovieName");
-  const bool has_defocus = io::has_defocus(table);
-  if (has_defocus)
-    project.set("--ctf", path.string(), path, "GridCTF");
-  else
-    warn_of_unused_transfer(project, table);
+  const bool has_defocus = set_transfer_of_views(project, table, "GridCTF");
   const bool may_transfer = has_defocus || project.request().has_transfer;
   set_stated_optics(project, table.optics, path, {"Voltage", "Cs", "Amplitude"}, may_transfer);
   if (may_transfer && table.defocus_hand)

@@ -75,7 +75,7 @@ MaskedImage ViewDecoder::read_and_mask(std::size_t view, PixelCensus& census) co
   stack.read_section(section, image.values);
   census = mask_unusable(&image);
   if (!series_.plan().is_raw) mask_fill(series_.options().contrast, &image);
-  if (mask_) apply_mask(*mask_, section, &image);
+  if (mask_) census.num_masked = apply_mask(*mask_, section, &image);
   census.num_bad = mask_bad_pixels(&image);
   return image;
 }

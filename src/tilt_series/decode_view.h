@@ -23,6 +23,7 @@ inline constexpr float kSmallestDifference = 1e-18f;
 struct PixelCensus {
   std::int64_t num_not_finite = 0;  ///< or beyond kLargestPixelValue
   std::int64_t num_bad = 0;         ///< hot or dead pixels
+  std::int64_t num_masked = 0;      ///< left out by --mask
   std::int64_t is_constant = 1;     ///< 0 or 1, an integer as the other members, to be summed
 };
 

@@ -8,6 +8,7 @@
 
 #include "base/check.h"
 #include "base/log.h"
+#include "base/statistics.h"
 #include "io/images/mrc_format.h"
 #include "io/tables/alignment_files.h"
 #include "tomofield/error.h"
@@ -27,17 +28,21 @@ struct Slope {
   double slope = 0.0, correlation = 0.0;
 };
 
+Slope slope_of(const HalfMoments& moments) {
+  if (!(moments.all_squares > 0 && moments.sum_squares > 0)) return {};
+  return {moments.products / moments.sum_squares,
+          moments.products / std::sqrt(moments.all_squares * moments.sum_squares)};
+}
+
 // Returns the slope of all frames over the sum of the halves, over all sections.
-Slope slope_of(std::span<const HalfMoments> moments) {
+Slope slope_of_all(std::span<const HalfMoments> moments) {
   HalfMoments total;
   for (const HalfMoments& m : moments) {
     total.all_squares += m.all_squares;
     total.sum_squares += m.sum_squares;
     total.products += m.products;
   }
-  if (!(total.all_squares > 0 && total.sum_squares > 0)) return {};
-  return {total.products / total.sum_squares,
-          total.products / std::sqrt(total.all_squares * total.sum_squares)};
+  return slope_of(total);
 }
 
 bool are_counts(std::span<const HalfMoments> moments, double slope) {
@@ -96,6 +101,26 @@ void require_alike(double correlation, const std::string& halves, const std::str
         fmt::format("the sum of {} correlates with '{}' by {:.2f} only: is it made "
                     "from other frames, or weighted or filtered otherwise?",
                     halves, all, correlation));
+}
+
+// Warns of sections whose halves look less like all frames than those of the others do: one of them
+// may be of another view.
+void warn_of_others(std::span<const std::int64_t> sections, std::span<const HalfMoments> moments,
+                    const std::string& halves, const std::string& all) {
+  constexpr double kUsual = 0.05, kTimes = 3;
+  std::vector<double> correlations;
+  for (const HalfMoments& m : moments) correlations.push_back(slope_of(m).correlation);
+  const double usual = base::median(correlations);
+  const double least = usual - kUsual - kTimes * (1 - usual);
+  std::vector<std::int64_t> others;
+  for (std::size_t i = 0; i < sections.size(); ++i)
+    if (moments[i].n > 0 && correlations[i] < least) others.push_back(sections[i] + 1);
+  if (others.empty()) return;
+  base::log_warning(fmt::format(
+      "in section{} {} the sum of {} correlates with '{}' by {:.2f} only, and by {:.2f} in the "
+      "others: are these the halves of the same views? (--exclude leaves sections out)",
+      others.size() == 1 ? "" : "s", io::section_list(others), halves, all,
+      std::ranges::min(correlations), usual));
 }
 
 void require_same_size(const io::ImageStack& half, const io::ImageStack& all) {
@@ -179,8 +204,9 @@ void HalfStacks::match(std::span<const std::int64_t> sections, std::span<const H
                 stack(Half::kOdd).name());
   require_apart(moments, &HalfMoments::num_even_apart, stack(Half::kEven).name(), all.name());
   require_apart(moments, &HalfMoments::num_odd_apart, stack(Half::kOdd).name(), all.name());
-  const Slope found = slope_of(moments);
+  const Slope found = slope_of_all(moments);
   require_alike(found.correlation, names, all.name());
+  warn_of_others(sections, moments, names, all.name());
   const bool is_ratio = are_counts(moments, found.slope);
   const double gain = 2 * found.slope;
   for (std::size_t i = 0; i < sections.size(); ++i) {

@@ -145,6 +145,26 @@ TEST(HalfStacks, CorrectionsOfOneAloneAreSaid) {
   EXPECT_EQ(warnings.text().find("odd.mrc"), std::string::npos);
 }
 
+TEST(HalfStacks, SectionsOfAnotherViewAreNamed) {
+  const auto warnings_of = [](const Stacks& stacks) {
+    const testing::WarningCatcher warnings;
+    stacks.matched();
+    return warnings.text();
+  };
+  Stacks stacks(4, 4, 1);
+  EXPECT_EQ(warnings_of(stacks), "");
+  const auto in_order = io::open_image_stack(stacks.halves.even);
+  std::vector<float> last(kWidth * kHeight), own(kWidth * kHeight);
+  in_order->read_section(kSections - 1, last);
+  stacks.halves.even =
+      write_stack(stacks.scratch / "shuffled.mrc", kWidth, kHeight, kSections,
+                  [&](std::int64_t x, std::int64_t y, std::int64_t s) {
+                    in_order->read_section(s, own);
+                    return (s == 0 ? last : own)[static_cast<std::size_t>(y * kWidth + x)];
+                  });
+  testing::expect_parts(warnings_of(stacks), {"in section 1 the sum", "shuffled.mrc", "all.mrc"});
+}
+
 TEST(HalfStacks, StacksThatAreNoHalvesAreRefused) {
   const Stacks stacks(4, 4, 1), other(4, 4, 1, 26);
   const auto write = [&](const char* name, std::int64_t sections, const auto& value) {

@@ -100,6 +100,20 @@ void warn_of_other_size(const io::Mdoc& mdoc, const std::filesystem::path& path,
                      stack);
 }
 
+// Warns of a cell that is as large as a pixel usually is: libraries for MRC files take its side.
+void warn_of_small_cell(const io::ImageStack& stack) {
+  constexpr double kSmallestPixel_A = 0.1, kLargestPixel_A = 100;
+  const io::MrcHeader& header = stack.header();
+  const double pixel_A = header.voxel_size_A[0];
+  const double cell_A = pixel_A * static_cast<double>(header.nx);
+  if (!io::is_known_size(pixel_A) || pixel_A >= kSmallestPixel_A || cell_A > kLargestPixel_A)
+    return;
+  base::log_warning(
+      fmt::format("the header of '{}' has a cell of {:.6g} Å, so pixels of {:.6g} Å: is the former "
+                  "the size of a pixel? (--pixel-size {:.6g})",
+                  stack.name(), cell_A, pixel_A, cell_A));
+}
+
 // Warns of titles among the labels that state no axis that can be, or another one than the extended
 // header does.
 void warn_of_titles(const TiltSeriesOptions& options, const io::ImageStack& stack) {
@@ -183,6 +197,7 @@ void warn_of_headers(const TiltSeriesOptions& options, const io::ImageStack& sta
         "other programs and this one from the bottom: with files of IMOD, give the stack that its "
         "newstack writes of it",
         stack.name()));
+  if (!options.pixel_size_A && !stack.is_in_memory()) warn_of_small_cell(stack);
   warn_of_titles(options, stack);
   warn_of_second_alignment(options, stack);
   if (mdoc)

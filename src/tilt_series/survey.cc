@@ -137,10 +137,12 @@ class Surveyor {
   // Shares what each process found in its views, and refuses what cannot be used.
   void check(std::vector<ViewCheck> checks) {
     processes_.allreduce_sum(std::span(checks), &ViewCheck::num_not_finite, &ViewCheck::num_bad,
-                             &ViewCheck::is_constant, &ViewCheck::has_contrast);
+                             &ViewCheck::num_masked, &ViewCheck::is_constant,
+                             &ViewCheck::has_contrast);
     const io::MrcHeader& header = series_.stack().header();
     processes_.run_collectively([&] {
       require_plausible_scale(checks, series_.stack().name(), header.nx * header.ny);
+      warn_of_mask_without_effect(checks, options_.mask);
       for (std::size_t index = 0; index < num_views(); ++index) {
         const View& view = series_.views()[index];
         const std::string name = fmt::format("section {} (tilt {}°) of '{}'", view.section + 1,

@@ -194,6 +194,10 @@ TEST(TiltSeries, PixelSizeOfTheMdocWhereTheHeaderHasNone) {
   const WarningCatcher of_one;
   EXPECT_DOUBLE_EQ(TiltSeries(options).pixel_size_A(), 1.0);
   expect_parts(of_one.text(), {"states pixels of 1 Å", "--pixel-size"});
+  write_stack(options.stack, 16, 12, 1, some_value, 1.35 / 16);  // a cell of one pixel's size
+  const WarningCatcher of_cell;
+  EXPECT_DOUBLE_EQ(TiltSeries(options).pixel_size_A(), static_cast<double>(1.35f) / 16);
+  expect_parts(of_cell.text(), {"a cell of 1.35 Å", "--pixel-size 1.35"});
 }
 
 TEST(TiltSeries, AnMdocOfAnotherSeriesIsSaid) {

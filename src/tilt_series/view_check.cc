@@ -30,7 +30,8 @@ bool has_contrast(const MaskedImage& image) {
 }  // namespace
 
 ViewCheck check_view(const PixelCensus& census, const MaskedImage& image) {
-  return {census.num_not_finite, census.num_bad, census.is_constant, has_contrast(image)};
+  return {census.num_not_finite, census.num_bad, census.num_masked, census.is_constant,
+          has_contrast(image)};
 }
 
 void require_plausible_scale(std::span<const ViewCheck> found, const std::string& stack,
@@ -51,6 +52,16 @@ void require_plausible_scale(std::span<const ViewCheck> found, const std::string
         fmt::format("in every view of '{}' all pixels have the same value, or they differ by less "
                     "than {:.0e}: {}",
                     stack, static_cast<double>(kSmallestDifference), advice));
+}
+
+void warn_of_mask_without_effect(std::span<const ViewCheck> found,
+                                 const std::optional<std::filesystem::path>& mask) {
+  const auto masks_some = [](const ViewCheck& view) { return view.num_masked > 0; };
+  if (!mask || std::ranges::any_of(found, masks_some)) return;
+  base::log_warning(
+      fmt::format("the mask '{}' has no pixel that is 0 in the views, so it leaves none out: write "
+                  "0 where a pixel is left out, and 1 elsewhere",
+                  mask->string()));
 }
 
 void require_usable(const ViewCheck& found, const std::string& name, std::int64_t section,

@@ -86,6 +86,7 @@ Verdict judge(const FinishedFit& finished, const std::optional<measurement::View
       find_warnings(verdict, {.contrast = finished.options.views.contrast,
                               .alignment = finished.alignment,
                               .tilt_deg = series.geometry.tilt_deg,
+                              .residual = fit.progress().view_residual,
                               .thickness = series.geometry.thickness,
                               .bin_factor = series.bin_factor,
                               .aligned_before = finished.options.run.align,

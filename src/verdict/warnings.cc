@@ -375,15 +375,28 @@ std::optional<Warning> unexplained(const Verdict& verdict, Alignment aligned_bef
           verdict.residual, advice_on_alignment(aligned_before))};
 }
 
-std::optional<Warning> speckled(const Verdict& verdict) {
+// Names a view that is explained far worse than the others, or returns an empty text.
+std::string foreign_view(const GivenInput& input) {
+  constexpr double kTimes = 5, kLeastResidual = 3;
+  if (input.residual.empty()) return "";
+  const auto worst = std::ranges::max_element(input.residual);
+  const double usual = base::median(input.residual);
+  if (*worst < kLeastResidual || *worst < kTimes * usual) return "";
+  return fmt::format(
+      "the view at {:.1f}° leaves {:.3g} times the variance of its noise, and the others {:.2g}: "
+      "look whether it is damaged or of another specimen (--exclude leaves it out); else ",
+      input.tilt_deg[static_cast<std::size_t>(worst - input.residual.begin())], *worst, usual);
+}
+
+std::optional<Warning> speckled(const Verdict& verdict, const GivenInput& input) {
   const auto& speckle = verdict.artefacts.speckle;
   if (!speckle || *speckle < kMostSpeckle || verdict.residual < kResidualOfSpeckle)
     return std::nullopt;
   return Warning{"speckle",
                  fmt::format("{:.2f} % of the voxels stick out from all their neighbours, and the "
-                             "views are not explained by it, so that it is probably noise: give a "
-                             "stronger --denoise, or --tv-penalty smooth",
-                             100 * *speckle)};
+                             "views are not explained by it, so that it is probably noise: {}give "
+                             "a stronger --denoise, or --tv-penalty smooth",
+                             100 * *speckle, foreign_view(input))};
 }
 
 std::optional<Warning> overfitted(const Verdict& verdict) {
@@ -429,7 +442,7 @@ std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& inp
   if (verdict.views) add(correlated_noise(verdict, input.bin_factor));
   if (!warnings.empty()) return warnings;
   add(unexplained(verdict, input.aligned_before));
-  add(speckled(verdict));
+  add(speckled(verdict, input));
   add(overfitted(verdict));
   return warnings;
 }

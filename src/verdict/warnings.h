@@ -14,9 +14,10 @@ struct GivenInput {
   Contrast contrast = Contrast::kDark;
   /// Where the pixels of each aligned view come from in the stack.
   std::vector<geometry::RawFromAligned> alignment = {};
-  std::vector<double> tilt_deg = {};           ///< of each view
-  double thickness = 0.0;                      ///< in pixels of the fit
-  double bin_factor = 1.0;                     ///< of these pixels to the stack's
+  std::vector<double> tilt_deg = {};  ///< of each view
+  std::vector<double> residual = {};  ///< of each view, as Verdict::residual; 0: not fitted
+  double thickness = 0.0;             ///< in pixels of the fit
+  double bin_factor = 1.0;            ///< of these pixels to the stack's
   Alignment aligned_before = Alignment::kOff;  ///< RunOptions::align
   /// Options of the fit, as on the command line, that are far from what any series needs.
   std::vector<std::string> extreme_settings = {};

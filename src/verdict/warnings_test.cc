@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "expect_parts.h"
+
 namespace tomofield::verdict {
 namespace {
 
@@ -238,6 +240,9 @@ TEST(Warnings, SpeckleIsNoiseIfTheViewsAreNotExplained) {
   EXPECT_EQ(codes(verdict), "");
   verdict.residual = 1.55;
   EXPECT_EQ(codes(verdict), "speckle ");
+  const GivenInput input{.tilt_deg = {-30, 0, 30, 60}, .residual = {0.9, 0.8, 22, 1.1}};
+  testing::expect_parts(find_warnings(verdict, input).front().message,
+                        {"the view at 30.0° leaves 22 times", "--exclude", "--denoise"});
   verdict.artefacts.speckle = 0.0005;
   EXPECT_EQ(codes(verdict), "");
 }

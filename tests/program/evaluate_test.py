@@ -698,3 +698,23 @@ def test_a_stopped_comparison_leaves_nothing(tmp_path):
             assert "stopped; nothing was written" in said, said
         left = set(os.listdir(results))
         assert left in (set(), {file.name for file in files}), left
+
+
+def test_volumes_beyond_the_memory_are_refused_before_they_are_read():
+    """The file is sparse: only its header takes room."""
+    large = save("sparse.mrc", np.zeros((1, 2, 2)))
+    side, sections = 32768, 1024  # 4 TiB
+    sizes = [side, side, sections]
+    with open(large, "r+b") as file:
+        for place in (0, 28):
+            file.seek(place)
+            file.write(struct.pack("<3i", *sizes))
+        file.seek(40)
+        file.write(struct.pack("<3f", *(10.0 * size for size in sizes)))
+        file.truncate(1024 + 4 * side * side * sections)
+    for options in (["--cnr"], [large], ["--membranes", large]):
+        refused = run(large, *options)
+        assert refused.returncode == 2, refused.stderr
+        for part in ("sparse.mrc", "GiB of memory", "bin it"):
+            assert part in refused.stderr, refused.stderr
+    os.remove(large)

@@ -669,7 +669,7 @@ def test_a_table_in_another_order_than_the_views_is_named():
         for row, i in enumerate(order)))
     said = harness.succeed("reconstruct", "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--ctf", "TS.defocus",
                            *short, cwd=folder)
-    expect(said.stderr, "'TS.defocus' lists the views in another order", "matched by their tilts")
+    expect(said.stderr, "warning: 'TS.defocus' lists the views in another order", "matched by their tilts")
     rows = "".join(f"{i + 1} 0 1 0 0 1 1 1 0 {-tilt}\n" for i, tilt in enumerate(TILTS))
     write(folder, "TS.aln", f"# RawSize = 72 56 {len(TILTS)}\n# NumPatches = 0\n" + rows)
     said = dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt", "--aln", "TS.aln")

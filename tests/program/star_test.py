@@ -86,6 +86,37 @@ def test_the_defocus_of_a_project_is_used(relion, finished):
     assert "(not used: --defocus 3 is given)" in result.stdout, result.stdout
 
 
+def test_a_view_without_defocus_may_be_excluded(series):
+    folder = harness.fresh_directory("relion_gap")
+    star = star_projects.write_relion(folder, series)
+    table = pathlib.Path(folder, "Tomograms/job009/tilt_series/TS_01.star")
+    lines = table.read_text(encoding="utf-8").splitlines()
+    rows = [i for i, line in enumerate(lines) if "TS_01_" in line]
+    lines[rows[3]] = lines[rows[3]].replace("30000", "None")
+    table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    def dry(*options):
+        said = harness.succeed("reconstruct", star, "--series", "TS_01", "--dry-run", "-o", "out.mrc",
+                               *options, cwd=folder)
+        return said.stdout + said.stderr
+
+    assert "row 4, so its contrast transfer is not applied" in dry()
+    excluded = dry("--exclude", 4)
+    assert "not applied" not in excluded and "--ctf Tomograms/job009/tilt_series/TS_01.star" in excluded
+    assert "not applied" not in dry("--exclude", 4, "--ctf", table)
+
+
+def test_the_detector_of_a_project_may_be_left_out(series):
+    folder = harness.fresh_directory("relion_mtf")
+    star = pathlib.Path(star_projects.write_relion(folder, series))
+    text = star.read_text(encoding="utf-8").replace("_rlnTomoSizeZ #10", "_rlnTomoSizeZ #10 \n_rlnMtfFileName #11")
+    star.write_text(text.replace(f" {THICKNESS} \n", f" {THICKNESS} absent_mtf.star \n"), encoding="utf-8")
+    command = ["reconstruct", star, "--series", "TS_01", "--dry-run", "-o", "out.mrc"]
+    refused = harness.tomofield(*command, cwd=folder)
+    assert refused.returncode == 2 and "--ignore rlnMtfFileName" in refused.stderr, refused.stderr
+    harness.succeed(*command, "--ctf", "none", cwd=folder)
+
+
 def test_the_result_goes_back_to_relion(relion, finished):
     _, output = finished
     (row,) = star_projects.read_rows(output[:-4] + ".star")

@@ -1,6 +1,7 @@
 """A project of another program gives the same files from the command line, Python and C++."""
 
 import json
+import os
 import shutil
 import subprocess
 
@@ -161,3 +162,24 @@ def test_align_writes_the_alignment_alone(series, tmp_path):
                            contrast="bright", with_margin=False, output=tmp_path / "a.mrc")
     names = {path.name for path in tmp_path.iterdir()}
     assert {"a_align.xf", "a_align.tlt", "a_align.json"} <= names and "a.mrc" not in names
+
+
+def test_names_that_are_not_utf8_are_said(folder, tmp_path):
+    """Folders of old systems have names in Latin-1, and sentences say them."""
+    latin = os.path.join(os.fsencode(tmp_path), b"Z\xfcrich")
+    shutil.copytree(os.fsencode(folder), latin)
+    with open(os.path.join(latin, b"newst.com"), "ab") as file:
+        file.write(b"NoSuchEntry 1\n")
+    name = os.fsdecode(latin)
+    project = tomofield.open_project(name)
+    assert any("Z\\xfcrich" in warning and "NoSuchEntry" in warning for warning in project.warnings)
+    transforms = [s.value for s in project.settings if s.option == "--xf"]
+    assert transforms == [os.path.join(name, "TS_01.xf")] and os.path.exists(transforms[0])
+    made = tomofield.reconstruct(name, **QUICK)
+    assert json.loads(made.metrics) if isinstance(made.metrics, str) else made.metrics
+    for refused in (lambda: tomofield.read_mrc(name + "/none.mrc"),
+                    lambda: tomofield.open_project(name + "/none"),
+                    lambda: tomofield.Model(name + "/none.h5"),
+                    lambda: tomofield.reconstruct(name + "/TS_01.st", thickness=16)):
+        with pytest.raises(tomofield.Error, match=r"Z\\xfcrich"):
+            refused()

@@ -40,6 +40,7 @@ std::optional<projects::Project> read_project(const CLI::App& command,
        .series = series.count() == 0 ? "" : series.results().front(),
        .has_mdoc = choices.files.mdoc.has_value(),
        .has_transfer = choices.options.views.defocus_um || choices.files.ctf,
+       .exclude = choices.options.views.exclude,
        .has_detector = choices.files.mtf || choices.files.ctf == "none",
        .pixel_size_A = choices.options.views.pixel_size_A});
 }

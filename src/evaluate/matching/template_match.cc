@@ -7,6 +7,7 @@
 #include <functional>
 #include <numbers>
 
+#include "base/system/memory.h"
 #include "base/threads/parallel.h"
 #include "evaluate/resolution/fsc.h"
 #include "tomofield/error.h"
@@ -91,6 +92,10 @@ TemplateMatcher::TemplateMatcher(const base::Volume& volume, double radius_px)
         "the volume has {} voxels along its shortest axis: too few to look for particles of a "
         "radius of {:.1f} voxels",
         shortest, radius_px));
+  // Three spectra, a copy within the transform, and the deviations.
+  constexpr std::size_t kBytesOfVoxel = 4 * sizeof(std::complex<float>) + sizeof(float);
+  base::require_memory(kBytesOfVoxel * shape_.voxels(), "the search for particles",
+                       "cut a part out of the volume");
   Spectrum sphere(shape_.voxels());
   double count = 0.0;
   visit_sphere(shape_, radius_px, [&](const Vector&, std::size_t i) {

@@ -113,8 +113,9 @@ MrcMode decode_mode(std::int32_t mode, const std::string& name) {
   const char* hint = mode == 3 || mode == 4 ? "complex values"
                      : mode == 101 ? "4-bit values; expand them first (IMOD's newstack -mode 1)"
                                    : "no mode of MRC2014, so this is probably no MRC file";
-  throw Error(fmt::format("'{}': MRC mode {} cannot be read ({}); modes 0, 1, 2, 6 and 12 can",
-                          name, mode, hint));
+  throw Error(fmt::format(
+      "'{}': MRC mode {} cannot be read ({}); give an MRC file of mode 0, 1, 2, 6 or 12", name,
+      mode, hint));
 }
 
 void require_sizes(const MrcHeader& header, const std::string& name) {

@@ -53,6 +53,17 @@ FiducialPoint parse_point(const PointFile& file, const TextLine& line,
   return {numbers[first], numbers[first + 1], numbers[first + 2], line.number};
 }
 
+// Tells whether the last column has scores from 0 to 1, and so the first no numbers of contours.
+bool has_scores(const std::vector<FiducialPoint>& points) {
+  const auto is_part = [](const FiducialPoint& point) {
+    return point.section > 0 && point.section < 1;
+  };
+  const auto is_score = [](const FiducialPoint& point) {
+    return point.section >= 0 && point.section <= 1;
+  };
+  return std::ranges::all_of(points, is_score) && std::ranges::any_of(points, is_part);
+}
+
 }  // namespace
 
 std::vector<FiducialPoint> read_fiducial_points(const std::filesystem::path& path,
@@ -75,6 +86,11 @@ std::vector<FiducialPoint> read_fiducial_points(const std::filesystem::path& pat
     points.push_back(parse_point(file, line, words, before));
   }
   if (points.empty()) throw Error(fmt::format("'{}' holds no {}", path.string(), what));
+  if (num_columns > kMinColumns && has_scores(points))
+    throw Error(fmt::format(
+        "'{}' has numbers from 0 to 1 alone in its last column, where z is expected: are these "
+        "scores? Give the columns x y z alone, or z in voxels",
+        path.string()));
   return points;
 }
 

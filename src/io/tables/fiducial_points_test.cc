@@ -37,6 +37,7 @@ TEST(FiducialPoints, FaultyLinesAreNamed) {
         Case{"1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27\n", "…",
              "line 1"},
         Case{"10 20 5 0.3\n9 24 12 0.4\n", "another order", "line 2"},
+        Case{"20 30 10 0.93\n40 20 5 0.8\n", "scores", "last column"},
         Case{"", "no fiducial", "f.txt"}}) {
     const auto path = scratch.write("f.txt", c.text);
     const std::string message = message_of<Error>([&] { read_fiducial_points(path); });

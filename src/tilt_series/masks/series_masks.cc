@@ -159,8 +159,9 @@ io::MrcReader open_mask(const std::filesystem::path& mask, const io::ImageStack&
       mask.string(), have.nx, have.ny, have.nz, stack.name(), want.nx, want.ny, want.nz));
 }
 
-void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* image) {
+std::int64_t apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* image) {
   std::vector<float> counts(image->values.size());
+  std::int64_t num_masked = 0;
   mask.read_section(section, counts);
   for (std::size_t i = 0; i < counts.size(); ++i) {
     if (!std::isfinite(counts[i]))
@@ -169,9 +170,11 @@ void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* im
                       "where a pixel is left out, and 1 elsewhere",
                       mask.path().string(), section + 1));
     if (counts[i] != 0.0f) continue;
+    ++num_masked;
     image->valid[i] = 0;
     image->values[i] = 0.0f;
   }
+  return num_masked;
 }
 
 bool searches_beads(const TiltSeriesOptions& options) { return options.bead_diameter_nm != 0.0; }

@@ -22,8 +22,8 @@ struct BeadMasks {
 /// Opens the user's mask (--mask). Throws Error if it is not as large as the stack.
 io::MrcReader open_mask(const std::filesystem::path& mask, const io::ImageStack& stack);
 
-/// Marks the pixels that are 0 in the mask's section as no measurements.
-void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* image);
+/// Marks the pixels that are 0 in the mask's section as no measurements, and returns their number.
+std::int64_t apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* image);
 
 /// Returns the largest diameter of beads that can be found in views with this shorter side.
 double largest_bead_px(double shorter_side_px);

@@ -6,11 +6,13 @@
 #include <numeric>
 
 #include "bead_series.h"
+#include "expect_parts.h"
 #include "io/images/mrc.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
+#include "warning_catcher.h"
 
 namespace tomofield::tilt_series {
 namespace {
@@ -88,6 +90,11 @@ TEST(SeriesMasks, ZerosOfTheUsersMaskAreLeftOut) {
 TEST(SeriesMasks, AMaskOfAnotherSizeOrWithoutAMeasurementIsRefused) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = plain_series(scratch);
+  options.mask = write_stack(
+      scratch / "ones.mrc", kWidth, kHeight, 3, [](auto, auto, auto) { return 1e-6f; }, kPixelSize);
+  const testing::WarningCatcher warnings;
+  TiltSeries{options};
+  testing::expect_parts(warnings.text(), {"ones.mrc", "has no pixel that is 0"});
   options.mask = write_stack(scratch / "small.mrc", kWidth, kHeight, 2, some_value, kPixelSize);
   expect_refusal(options, {"small.mrc", "64 × 48 pixels and 2 sections", "a.st", "and 3"});
   options.mask = write_stack(
