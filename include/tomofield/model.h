@@ -9,8 +9,9 @@
 
 namespace tomofield {
 
-/// A position in a model: x, y, z in pixels of the aligned, binned view at zero tilt, whose pixel i
-/// covers [i, i + 1); z runs from 0 to the thickness, towards the source.
+/// A position in the volume that reconstruct writes of all of the view: x, y, z in pixels of the
+/// aligned, binned view at zero tilt, whose pixel i covers [i, i + 1); z runs from 0 to the
+/// thickness, towards the source. An x-axis tilt of the views is turned back in it.
 using Point = std::array<double, 3>;
 
 /// Cubic voxels anywhere in a model. A tilted plane is a box with one voxel in z.
@@ -46,8 +47,7 @@ class Model {
 
   /// Returns the size in Å of the pixels that positions count.
   double pixel_size_A() const;
-  /// Returns the region of interest, in whole voxels of `voxel_px` pixels. Its angles are 0 unless
-  /// the views have an x-axis tilt, which turns the specimen in the model. Throws Error for a size
+  /// Returns the region of interest, in whole voxels of `voxel_px` pixels. Throws Error for a size
   /// of voxels that is not finite or not above 0.
   SampleBox region(double voxel_px = 1.0) const;
 

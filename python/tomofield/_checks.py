@@ -92,7 +92,17 @@ def text_of(value: object, what: str) -> str:
     """Return a text."""
     if not isinstance(value, str):
         raise TypeError(f"{what} is a text, not {shown(value)}")
+    if said(value) != value:
+        raise Error(f"{what} '{said(value)}' is no text: give one in Unicode")
     return value
+
+
+def said(text: object) -> str:
+    r"""Return a text for messages: bytes of a file's name that are not UTF-8 become \xfc."""
+    try:
+        return os.fsencode(str(text)).decode("utf-8", "backslashreplace")
+    except UnicodeEncodeError:  # half of a pair of surrogates
+        return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def array_of(value: Any, numbers: Type[Any] = np.float32) -> Any:

@@ -5,7 +5,7 @@ import pathlib
 from typing import Any, List, NamedTuple
 
 from . import _core
-from ._checks import Path, chosen, no_option, path_of, text_of
+from ._checks import Path, chosen, no_option, path_of, said, text_of
 from .options import Options
 
 
@@ -55,7 +55,7 @@ class Project:
         return getattr(self._core, name)
 
     def __repr__(self) -> str:
-        return f"<Project of {self.stack} with {len(self.settings)} settings>"
+        return f"<Project of {said(self.stack)} with {len(self.settings)} settings>"
 
     def _repr_html_(self) -> str:
         rows = [("option", "value", "file", "entry")]

@@ -5,7 +5,7 @@ import pathlib
 from dataclasses import dataclass, field
 from typing import Any, Dict, List
 
-from ._checks import Path, path_of
+from ._checks import Path, path_of, said
 from ._core import Error
 from ._projects import Setting
 
@@ -50,16 +50,16 @@ def read_record(path: Path) -> Record:
     """Return the record of a run from its .json file, or from the one beside a tomogram."""
     given = pathlib.Path(path_of(path, "the record"))
     if not given.name:
-        raise Error(f"the record is a file, and '{given}' names a folder")
+        raise Error(f"the record is a file, and '{said(given)}' names a folder")
     file = given.with_suffix(".json")
     try:
         return record_of(file.read_text(encoding="utf-8"))
     except OSError as error:
-        raise Error(f"cannot read '{file}': {error.strerror}") from None
+        raise Error(f"cannot read '{said(file)}': {error.strerror}") from None
     except ValueError as error:
-        raise Error(f"'{file}' is no JSON: {error}") from None
+        raise Error(f"'{said(file)}' is no JSON: {error}") from None
     except (KeyError, TypeError, AttributeError):
-        raise Error(f"'{file}' is not the record of a run of tomofield") from None
+        raise Error(f"'{said(file)}' is not the record of a run of tomofield") from None
 
 
 def read_metrics(path: Path) -> Dict[str, Any]:

@@ -92,7 +92,8 @@ class Box:
     """Cubic voxels anywhere in a model. A tilted plane is a box with one voxel in z.
 
     centre_px: x, y, z of the box's geometric centre, in pixels of the model: of the aligned, binned
-        view at zero tilt, whose pixel i covers [i, i + 1); z runs from 0 to the thickness.
+        view at zero tilt, whose pixel i covers [i, i + 1); z runs from 0 to the thickness. An x-axis
+        tilt of the views is turned back, as in the volume that reconstruct() writes.
     size: voxels in x, y, z.
     voxel_px: side of a voxel in pixels.
     euler_deg: rot, tilt, psi as RELION's rlnAngleRot, rlnAngleTilt and rlnAnglePsi.

@@ -128,12 +128,13 @@ Tomogram tomogram_of(const Solution& solution, const measurement::Measurement& s
 }
 
 void write_volume(const Solution& solution, const measurement::Measurement& series,
-                  const BaselineOptions& options, const std::filesystem::path& path) {
+                  const BaselineOptions& options, const std::filesystem::path& path,
+                  std::optional<float> largest_density = {}) {
   output::ModelInfo info = output::model_info(series, options.shared.views.contrast);
   info.options_json = options_json(options).dump();
   write_voxels(voxels_of(solution.densities), output::region_box(info, 1.0), info,
                fmt::format("baseline {}", facts_of(options.method).name), options.shared.volume,
-               path);
+               path, distributed::Communicator::alone(), largest_density);
 }
 
 // Writes the volume, the record and the pictures of a run, which appear together.
@@ -220,9 +221,11 @@ BaselinePlan plan_baseline(const tilt_series::PlannedSeries& series,
   measurement::require_pixels(planned.geometry.width, planned.geometry.height);
   if (planned.x_tilt_deg != 0.0) {
     throw Error(fmt::format(
-        "the series has an x-axis tilt of {}°, which this baseline does not turn back: leave "
-        "--xtilt out (the volume is then turned by it), or use reconstruct or baseline tensorf",
-        planned.x_tilt_deg));
+        "the series has an x-axis tilt of {}°, which a linear volume or a baseline does not turn "
+        "back: leave --xtilt and --x-axis-tilt out, or --ignore their entries of a project (the "
+        "volume is then turned by it), or use reconstruct without --denoising-halves, or baseline "
+        "tensorf",
+        std::abs(planned.x_tilt_deg)));
   }
   // This and trial_views() throw if there are too few views.
   const std::vector<int> held_out =
@@ -297,18 +300,26 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   return summary;
 }
 
-void write_linear_volume(const measurement::Measurement& series, const Options& shared,
-                         const std::filesystem::path& path) {
-  const base::TraceSpan span("linear volume");
-  const BaselineOptions options{{}, shared, WbpOptions{}};
-  std::vector<int> unused = series.held_out;
-  unused.insert(unused.end(), series.left_out.begin(), series.left_out.end());
-  std::ranges::sort(unused);
-  const VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays,
-                             series.noise_sigma, {unused, false});
-  write_volume(reconstruct_wbp(problem, WbpOptions{}, series.mean_density,
-                               [](const IterationReport&, VoxelVolume&) {}),
-               series, options, path);
+LinearVolume::LinearVolume(const measurement::Measurement& series, const Options& shared)
+    : series_(series), options_{{}, shared, WbpOptions{}}, solution_([&] {
+        const base::TraceSpan span("linear volume");
+        std::vector<int> unused = series.held_out;
+        unused.insert(unused.end(), series.left_out.begin(), series.left_out.end());
+        std::ranges::sort(unused);
+        const VoxelProblem problem(series.geometry, grid_of(series, options_), *series.rays,
+                                   series.noise_sigma, {unused, false});
+        return reconstruct_wbp(problem, WbpOptions{}, series.mean_density,
+                               [](const IterationReport&, VoxelVolume&) {});
+      }()) {}
+
+float LinearVolume::largest_density() const {
+  return output::largest_density(voxels_of(solution_.densities),
+                                 distributed::Communicator::alone());
+}
+
+void LinearVolume::write(const std::filesystem::path& path,
+                         std::optional<float> largest_density) const {
+  write_volume(solution_, series_, options_, path, largest_density);
 }
 
 }  // namespace tomofield::baseline

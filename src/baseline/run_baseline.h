@@ -90,10 +90,22 @@ struct BaselineProgress {
 BaselineSummary run_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options,
                              const BaselineProgress& progress);
 
-/// Reconstructs a prepared measurement by weighted back-projection, without held-out and left-out
-/// views and without scales of views, so that the result is linear in the rays. Writes the volume
-/// alone, as run_baseline() does. `shared` has the options of the specimen and of the volume.
-void write_linear_volume(const measurement::Measurement& series, const Options& shared,
-                         const std::filesystem::path& path);
+/// The weighted back-projection of a prepared measurement, without held-out and left-out views and
+/// without scales of views, so that it is linear in the rays.
+class LinearVolume {
+ public:
+  /// Reconstructs it. `shared` has the options of the specimen and of the volume. `series` must
+  /// live as long.
+  LinearVolume(const measurement::Measurement& series, const Options& shared);
+
+  float largest_density() const;
+  /// Writes the volume alone, as run_baseline() does. `largest_density` is that of VolumePart.
+  void write(const std::filesystem::path& path, std::optional<float> largest_density) const;
+
+ private:
+  const measurement::Measurement& series_;
+  BaselineOptions options_;
+  Solution solution_;
+};
 
 }  // namespace tomofield::baseline

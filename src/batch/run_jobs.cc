@@ -97,9 +97,9 @@ bool run_jobs(const RunOptions& options, const std::vector<Job>& jobs, const Roo
     free.memory_bytes -= sign * job.needs.memory_bytes(threads);
     free.jobs -= sign;
   };
-  bool is_stopped = false;
+  const auto must_stop = [&] { return options.stop_requested && options.stop_requested(); };
+  bool is_stopped = must_stop(), are_all_done = true;
   while (!running.empty() || (!waiting.empty() && !is_stopped)) {
-    is_stopped = is_stopped || (options.stop_requested && options.stop_requested());
     const auto starts =
         is_stopped ? std::vector<Start>{} : choose_starts(jobs, waiting, free, running.empty());
     for (const Start& start : starts) {
@@ -118,14 +118,16 @@ bool run_jobs(const RunOptions& options, const std::vector<Job>& jobs, const Roo
       if (!job->has_ended()) return false;
       take(job->job(), job->threads(), -1);
       options.job_ends(job->job(), job->state());
+      are_all_done = are_all_done && job->state().progress == Progress::kDone;
       return true;
     };
     if (std::erase_if(running, has_ended) > 0)
       write_summary(options.folder, jobs);
     else
       base::pause_between_polls();
+    is_stopped = must_stop();  // a terminal stops the runs, too, and perhaps the last ones first
   }
-  return waiting.empty() && !is_stopped;
+  return waiting.empty() && (are_all_done || !is_stopped);
 }
 
 }  // namespace tomofield::batch

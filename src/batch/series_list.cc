@@ -289,7 +289,12 @@ void check_names(const std::vector<Series>& all, base::Faults& faults) {
     const bool is_file_name = !series.name.empty() && series.name.front() != '.' &&
                               series.name.find('/') == std::string::npos &&
                               base::printable(series.name) == series.name;
-    if (!is_file_name)
+    if (base::utf8_text(series.name) != series.name)
+      faults.add(
+          fmt::format("{}: '{}' is not UTF-8, and the list of a batch cannot hold it: give the "
+                      "file another name",
+                      series.source, base::printable(series.name)));
+    else if (!is_file_name)
       faults.add(fmt::format("{}: '{}' cannot be the name of a file; {}", series.source,
                              series.name, advice_on_name(series)));
     const auto [named, is_new_name] = names.emplace(series.name, &series);

@@ -41,15 +41,22 @@ void require_new(const std::vector<fs::path>& files) {
   }
 }
 
+// Returns every file that the comparison or one of its runs reads.
+std::vector<fs::path> inputs_of(const CompareOptions& options, const std::vector<Row>& rows) {
+  std::vector<fs::path> inputs;
+  if (options.truth) inputs.push_back(*options.truth);
+  for (const Row& row : rows) std::ranges::copy(row.run.inputs, std::back_inserter(inputs));
+  return inputs;
+}
+
+bool is_new(const Row& row) { return row.state.progress == Progress::kNone; }
+
 }  // namespace
 
 void check_folder(const CompareOptions& options, const std::vector<Row>& rows) {
-  std::vector<fs::path> inputs, results = report_files(options);
-  if (options.truth) inputs.push_back(*options.truth);
-  for (const Row& row : rows) {
-    std::ranges::copy(row.run.inputs, std::back_inserter(inputs));
-    std::ranges::copy(files_of(row), std::back_inserter(results));
-  }
+  const std::vector<fs::path> inputs = inputs_of(options, rows);
+  std::vector<fs::path> results = report_files(options);
+  for (const Row& row : rows) std::ranges::copy(files_of(row), std::back_inserter(results));
   io::require_no_input_is_replaced(results, inputs);
   io::require_distinct(results);
   for (const fs::path& file : results) io::output_target(file);  // throws for what is no file
@@ -58,10 +65,15 @@ void check_folder(const CompareOptions& options, const std::vector<Row>& rows) {
     throw Error(
         fmt::format("'{}' must be a folder: give another folder with -o", pictures.string()));
   if (options.overwrite) return;
-  const auto is_new = [](const Row& row) { return row.state.progress == Progress::kNone; };
   for (const Row& row : rows)
     if (is_new(row)) require_new(files_of(row));
   if (std::ranges::all_of(rows, is_new)) require_new(report_files(options));
+}
+
+void check_planned_files(const CompareOptions& options, const std::vector<Row>& rows,
+                         const Row& row, const std::vector<fs::path>& files) {
+  io::require_no_input_is_replaced(files, inputs_of(options, rows));
+  if (!options.overwrite && is_new(row)) require_new(files);
 }
 
 void remove_results(const CompareOptions& options, const std::vector<Row>& rows) {

@@ -13,6 +13,11 @@ namespace tomofield::compare {
 /// made: a run has made its files once it has a row there, and the report is of the first row on.
 void check_folder(const CompareOptions& options, const std::vector<Row>& rows);
 
+/// Checks the files that the run of a row may write or remove, as its dry run names them, like
+/// check_folder().
+void check_planned_files(const CompareOptions& options, const std::vector<Row>& rows,
+                         const Row& row, const std::vector<std::filesystem::path>& files);
+
 /// Removes all files of the runs and of the report, so that no old report stands beside new
 /// volumes, even if the comparison stops before it is finished.
 void remove_results(const CompareOptions& options, const std::vector<Row>& rows);

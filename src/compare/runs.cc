@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "base/system/child_process.h"
+#include "compare/folder.h"
 #include "compare/grid.h"
 #include "evaluate/box.h"
 #include "io/is_file.h"
@@ -86,10 +87,11 @@ Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
   return run;
 }
 
-// Returns the grid of the row's future volume, or nothing if it was asked to stop.
-std::optional<Grid> grid_to_be(const CompareOptions& options, const RunHooks& hooks, const Row& row,
-                               const io::ScratchFolder& scratch) {
-  if (is_done(row)) return read_grid(row.volume);
+// Returns the row's future volume, or nothing if it was asked to stop.
+std::optional<record::PlannedVolume> volume_to_be(const CompareOptions& options,
+                                                  const RunHooks& hooks, const Row& row,
+                                                  const io::ScratchFolder& scratch) {
+  if (is_done(row)) return record::PlannedVolume{read_grid(row.volume)};
   const fs::path log = scratch.log(), grid = scratch.plan();
   std::error_code absent;
   fs::remove(grid, absent);  // that of the row before
@@ -102,7 +104,7 @@ std::optional<Grid> grid_to_be(const CompareOptions& options, const RunHooks& ho
         fmt::format("{}: {}", row.run.name, base::reason_of_failure(result.exit_status, log)));
   if (!io::is_file(grid))
     throw Error(fmt::format("{}: its dry run has written no plan", row.run.name));
-  return record::read_planned_grid(grid);
+  return record::read_planned_volume(grid);
 }
 
 // Throws Error unless the regions and the profile that are given lie in the volumes.
@@ -139,16 +141,17 @@ bool rehearse(const CompareOptions& options, const RunHooks& hooks, const std::v
   const io::ScratchFolder scratch(options.folder, ".tomofield-rehearsal");
   std::optional<NamedGrid> main;
   for (const Row& row : rows) {
-    const std::optional<Grid> grid = grid_to_be(options, hooks, row, scratch);
-    if (!grid) return false;
+    const auto planned = volume_to_be(options, hooks, row, scratch);
+    if (!planned) return false;
+    check_planned_files(options, rows, row, planned->files);
     if (!main) {
-      main = {row.run.name, *grid};
+      main = {row.run.name, planned->grid};
       const bool is_a_part =
           std::ranges::find(options.series_words, "--roi") != options.series_words.end();
       if (options.truth) require_truth_fits(*options.truth, *main, is_a_part);
-      require_places_within(options, *grid);
+      require_places_within(options, planned->grid);
     }
-    require_one_grid(*main, {row.run.name, *grid});
+    require_one_grid(*main, {row.run.name, planned->grid});
   }
   return true;
 }

@@ -14,6 +14,7 @@
 #include "base/utf8.h"
 #include "evaluate/box.h"
 #include "evaluate/volume_pair.h"
+#include "io/images/mrc_format.h"
 #include "io/saving/scratch_memory.h"
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
@@ -113,9 +114,9 @@ void check_volume(const base::Volume& volume, const measurement::Measurement& se
                   const std::filesystem::path& path) {
   if (series.x_tilt_deg != 0.0) {
     throw Error(fmt::format(
-        "the series has an x-axis tilt of {}°, which is not turned back here: leave --xtilt out if "
-        "the volume was made without it",
-        series.x_tilt_deg));
+        "the series has an x-axis tilt of {}°, which is not turned back here: leave --xtilt and "
+        "--x-axis-tilt out if the volume was made without them",
+        std::abs(series.x_tilt_deg)));
   }
   if (volume.shape.nx != series.roi.width() || volume.shape.ny != series.roi.height()) {
     throw Error(fmt::format(
@@ -139,6 +140,11 @@ void require_place(const std::filesystem::path& path, const measurement::Measure
     throw Error(fmt::format(
         "'{}' was turned before it was sampled, and is projected as it lies in the views: give "
         "the volume that `reconstruct` wrote, or `export` without an angle",
+        path.string()));
+  if (std::ranges::count(volume.header().labels, io::kLabelOfXTilt) > 0)
+    throw Error(fmt::format(
+        "the x-axis tilt of the series is turned back in '{}', which a projection into the views "
+        "does not know: give a volume that was made without --xtilt and --x-axis-tilt",
         path.string()));
   const auto place = place_A(volume);
   if (!place || lies_at(*place, series.roi, series.pixel_size_A)) return;

@@ -78,8 +78,7 @@ OrientedBox box_in_field(const output::Model& model, const ExportPlace& place) {
   const Levelling level = place.level.value_or(Levelling{});
   require_possible(level);
   if (!place.box) return output::region_box(model, place.voxel_px, level);
-  const OrientedBox box =
-      place.level ? output::VolumeFrame(model, level).to_field(*place.box) : *place.box;
+  const OrientedBox box = output::VolumeFrame(model, level).to_field(*place.box);
   warn_of_margin(model, box);
   return box;
 }

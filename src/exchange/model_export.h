@@ -31,7 +31,7 @@ std::vector<io::OutputLock> claim_export(const ExportFiles& files, const std::st
 
 /// The place of a volume in a model.
 struct ExportPlace {
-  std::optional<field::OrientedBox> box = {};  ///< none: the region of interest
+  std::optional<field::OrientedBox> box = {};  ///< in the volume; none: the region of interest
   double voxel_px = 1.0;                       ///< side of the voxels of that region
   std::optional<Levelling> level = {};         ///< of the volume in which the box lies
 };

@@ -95,17 +95,13 @@ double Model::pixel_size_A() const { return impl_->model.pixel_size_A; }
 
 SampleBox Model::region(double voxel_px) const {
   require_usable_voxels(voxel_px);
-  const field::OrientedBox box = output::region_box(impl_->model, voxel_px);
-  SampleBox region{.centre_px = box.centre_px, .size = box.size, .voxel_px = box.voxel_px};
-  // An x-axis tilt turns the box about X: these Euler angles have the same matrix.
-  if (!box.is_aligned())
-    region.euler_deg = {90, impl_->model.geometry.hand * impl_->model.x_tilt_deg, 270};
-  return region;
+  const field::OrientedBox box = output::tomogram_box(impl_->model, voxel_px);
+  return {.centre_px = box.centre_px, .size = box.size, .voxel_px = box.voxel_px};
 }
 
 std::vector<float> Model::sample(const SampleBox& box) const {
   const base::ThreadsInUse threads;
-  const field::OrientedBox oriented = oriented_box(box);
+  const field::OrientedBox oriented = output::VolumeFrame(impl_->model).to_field(oriented_box(box));
   field::require_memory_of(oriented);
   output::announce_sampling(impl_->model, {&oriented, 1});
   auto values = output::sample_box(impl_->model, oriented);
@@ -121,7 +117,10 @@ std::vector<float> Model::sample_points(std::span<const Point> points) const {
           fmt::format("a point at {}, {}, {} cannot be sampled: its coordinates must be "
                       "finite",
                       point[0], point[1], point[2]));
-  std::vector<float> values = output::sample_points(impl_->model, points);
+  const output::VolumeFrame frame(impl_->model);
+  std::vector<Point> in_field;
+  for (const Point& point : points) in_field.push_back(frame.to_field(point));
+  std::vector<float> values = output::sample_points(impl_->model, in_field);
   output::to_output(impl_->model, values);
   return values;
 }

@@ -61,7 +61,7 @@ void require_inside(const Model& model, const BoxBounds& box) {
       "xyz"[*axis], box.low[*axis], box.high[*axis], field.low[*axis], field.high[*axis]));
 }
 
-// Returns the corner of the box from the view's corner in Å (docs/geometry.md).
+// Returns the corner of a box of the volume from the view's corner in Å (docs/geometry.md).
 std::array<double, 3> origin_A(const ModelInfo& info, const OrientedBox& box, VolumeAxes axes) {
   if (!box.is_aligned()) return {0.0, 0.0, 0.0};
   const auto [nx, ny, nz] = box.size;
@@ -75,6 +75,8 @@ std::array<double, 3> origin_A(const ModelInfo& info, const OrientedBox& box, Vo
   return corner;
 }
 
+}  // namespace
+
 float largest_density(const VoxelSource& source, const distributed::Communicator& processes) {
   std::mutex mutex;
   float largest = 0.0f;
@@ -86,6 +88,8 @@ float largest_density(const VoxelSource& source, const distributed::Communicator
   });
   return static_cast<float>(processes.allreduce_max(static_cast<double>(largest)));
 }
+
+namespace {
 
 // Writes densities times `scale` in the file's axes.
 class PartWriter {
@@ -196,13 +200,16 @@ void check_zarr(const std::filesystem::path& volume,
     throw Error(fmt::format("'{}' exists: {}", zarr.string(), advice));
 }
 
-OrientedBox region_box(const ModelInfo& model, double voxel_px, const Levelling& levelling) {
+OrientedBox tomogram_box(const ModelInfo& model, double voxel_px) {
   const auto& roi = model.roi;
-  return VolumeFrame(model, levelling)
-      .to_field(field::box_between(
-          {static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0},
-          {static_cast<double>(roi.x1), static_cast<double>(roi.y1), model.geometry.thickness},
-          voxel_px));
+  return field::box_between(
+      {static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0},
+      {static_cast<double>(roi.x1), static_cast<double>(roi.y1), model.geometry.thickness},
+      voxel_px);
+}
+
+OrientedBox region_box(const ModelInfo& model, double voxel_px, const Levelling& levelling) {
+  return VolumeFrame(model, levelling).to_field(tomogram_box(model, voxel_px));
 }
 
 float largest_density(const Model& model) {
@@ -255,9 +262,11 @@ void write_voxels(const VoxelSource& source, const OrientedBox& box, const Model
   if (options.axes == VolumeAxes::kXzy) std::swap(spec.ny, spec.nz);
   spec.mode = mrc_mode(options.voxel_type);
   spec.voxel_size_A.fill(box.voxel_px * info.pixel_size_A);
-  spec.origin_A = origin_A(info, box, options.axes);
+  const OrientedBox in_volume = VolumeFrame(info).from_field(box);
+  spec.origin_A = origin_A(info, in_volume, options.axes);
   spec.labels = volume_labels(info, made_by);
-  if (!box.is_aligned()) spec.labels.emplace_back(io::kLabelOfTurnedBox);
+  if (!in_volume.is_aligned()) spec.labels.emplace_back(io::kLabelOfTurnedBox);
+  if (info.x_tilt_deg != 0.0) spec.labels.emplace_back(io::kLabelOfXTilt);
 
   if (options.zarr) processes.run_collectively([&] { require_room_for_both(path, spec); });
 

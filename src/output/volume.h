@@ -49,17 +49,21 @@ void write_zarr(const std::filesystem::path& volume, ZarrVersion version);
 /// Returns the largest absolute density in the region of interest of a model.
 float largest_density(const Model& model);
 
-/// Returns the region of interest and the whole thickness, in whole voxels of `voxel_px` pixels,
-/// where it lies in the field: turned back by the x-axis tilt and brought level.
+/// Returns the region of interest and the whole thickness, in whole voxels of `voxel_px` pixels, as
+/// reconstruct writes it. It lies along the axes of that volume.
+field::OrientedBox tomogram_box(const ModelInfo& model, double voxel_px);
+
+/// Returns tomogram_box() where it lies in the field: turned back by the x-axis tilt and brought
+/// level.
 field::OrientedBox region_box(const ModelInfo& model, double voxel_px,
                               const Levelling& levelling = {});
 
 /// Writes a box of a model as an MRC volume, in the input's units and contrast (dark input: dense
-/// is low, an empty region is 0). The header has the exact voxel size and, as
-/// ORIGIN, the box's corner in the view, in Å (0 for a rotated box). kInt16 takes a second pass
-/// over the box for the largest value, which becomes 32000; the label in the header names the
-/// factor. The write is atomic and replaces an old file. Throws Error before any work if `path`
-/// cannot be written or if the box lies outside of the model.
+/// is low, an empty region is 0). The header has the exact voxel size and, as ORIGIN, the box's
+/// corner in the volume of all of the view, in Å (0 for a box that is turned in that volume).
+/// kInt16 takes a second pass over the box for the largest value, which becomes 32000; the label in
+/// the header names the factor. The write is atomic and replaces an old file. Throws Error before
+/// any work if `path` cannot be written or if the box lies outside of the model.
 void write_volume(const Model& model, const VolumeOptions& options,
                   const std::filesystem::path& path, const VolumePart& part = {});
 
@@ -78,6 +82,9 @@ void write_volume(Model& model, const VolumeOptions& options, const std::filesys
 /// Passes every voxel of a box to a sink once, part by part, on any threads. It is called twice for
 /// kInt16. Each of several processes passes voxels of its own.
 using VoxelSource = std::function<void(const field::BoxSink&)>;
+
+/// Returns the largest absolute density of a source, whose voxels several processes may share.
+float largest_density(const VoxelSource& source, const distributed::Communicator& processes);
 
 /// Writes densities from any source as write_volume() does. `made_by` goes into the header's label,
 /// and `largest` is VolumePart::largest_density.

@@ -33,6 +33,30 @@ Rotation product(const Rotation& a, const Rotation& b) {
   return result;
 }
 
+Rotation transposed(const Rotation& rotation) {
+  Rotation result{};
+  for (std::size_t row = 0; row < 3; ++row)
+    for (std::size_t column = 0; column < 3; ++column) result[row][column] = rotation[column][row];
+  return result;
+}
+
+Point turned_about(const Point& centre, const Rotation& rotation, const Point& point) {
+  Point from_centre{};
+  for (std::size_t a = 0; a < 3; ++a) from_centre[a] = point[a] - centre[a];
+  Point at = turned(rotation, from_centre);
+  for (std::size_t a = 0; a < 3; ++a) at[a] += centre[a];
+  return at;
+}
+
+field::OrientedBox turned_about(const Point& centre, const Rotation& rotation,
+                                const field::OrientedBox& box) {
+  if (rotation == field::kNoRotation) return box;
+  field::OrientedBox result = box;
+  result.centre_px = turned_about(centre, rotation, box.centre_px);
+  result.field_from_box = product(rotation, box.field_from_box);
+  return result;
+}
+
 // Returns D Ry(pitch) Rx(alpha) D. A mirrored Z turns the other way.
 Rotation rotation(double pitch_deg, double alpha_deg, int hand) {
   constexpr double kDegree = std::numbers::pi / 180.0;
@@ -136,19 +160,23 @@ VolumeFrame::VolumeFrame(const ModelInfo& model, const Levelling& levelling)
                                   model.geometry.hand)) {}
 
 Point VolumeFrame::to_field(const Point& point) const {
-  Point from_centre{};
-  for (std::size_t a = 0; a < 3; ++a) from_centre[a] = point[a] - centre_[a];
-  Point at = turned(field_from_volume_, from_centre);
-  for (std::size_t a = 0; a < 3; ++a) at[a] += centre_[a];
-  return at;
+  return turned_about(centre_, field_from_volume_, point);
 }
 
 field::OrientedBox VolumeFrame::to_field(const field::OrientedBox& box) const {
-  if (field_from_volume_ == field::kNoRotation) return box;
-  field::OrientedBox turned_box = box;
-  turned_box.centre_px = to_field(box.centre_px);
-  turned_box.field_from_box = product(field_from_volume_, box.field_from_box);
-  return turned_box;
+  return turned_about(centre_, field_from_volume_, box);
+}
+
+field::OrientedBox VolumeFrame::from_field(const field::OrientedBox& box) const {
+  field::OrientedBox found = turned_about(centre_, transposed(field_from_volume_), box);
+  constexpr double kRounding = 1e-9;
+  double largest = 0.0;
+  for (std::size_t row = 0; row < 3; ++row)
+    for (std::size_t a = 0; a < 3; ++a)
+      largest =
+          std::max(largest, std::abs(found.field_from_box[row][a] - field::kNoRotation[row][a]));
+  if (largest < kRounding) found.field_from_box = field::kNoRotation;
+  return found;
 }
 
 }  // namespace tomofield::output

@@ -15,7 +15,8 @@ namespace tomofield::output {
 /// `model`.
 Levelling found_levelling(const ModelInfo& model, const std::filesystem::path& file);
 
-/// The place of a volume in the field of a model. A point P of the volume lies in the field at
+/// The place of the volume that reconstruct writes, or of one that is brought level, in the field
+/// of a model. A point P of the volume lies in the field at
 ///
 ///   C + D Ry(pitch) Rx(alpha - x_tilt) D (P − C),    D = diag(1, 1, hand)
 ///
@@ -29,6 +30,8 @@ class VolumeFrame {
   field::Point to_field(const field::Point& point) const;
   /// Returns where a box of the volume lies in the field.
   field::OrientedBox to_field(const field::OrientedBox& box) const;
+  /// Undoes to_field(). A box that lies along the axes of the volume is so exactly.
+  field::OrientedBox from_field(const field::OrientedBox& box) const;
 
  private:
   field::Point centre_;

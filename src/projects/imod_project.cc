@@ -145,9 +145,29 @@ void refuse_what_is_missing(Project& project, CommandEntries& tilt) {
   warn_of_what_differs(project, tilt);
 }
 
+// Refuses local alignments whose places count in another image than that of the views that are
+// read: in whole views (FULLIMAGE), of which an aligned stack may be a part from SUBSETSTART on.
+void require_place_of_local(CommandEntries& tilt, const ImodImages& images) {
+  constexpr double kLargestPart = 0.05;  // of the views: parts are larger
+  const auto full = tilt.sizes("FULLIMAGE");
+  if (!full) return;
+  const auto start = tilt.numbers("SUBSETSTART", 2, 2, std::array{0.0, 0.0});
+  const double off_x = images.is_raw ? (full->at(0) - images.width) / 2 : start ? start->at(0) : 0;
+  const double off_y = images.is_raw ? (full->at(1) - images.height) / 2 : start ? start->at(1) : 0;
+  if (std::abs(off_x) <= kLargestPart * images.width &&
+      std::abs(off_y) <= kLargestPart * images.height)
+    return;
+  throw Error(fmt::format(
+      "'{}': the places of LOCALFILE count in images of {} × {} pixels (FULLIMAGE), and the views "
+      "of '{}' begin {:.4g}, {:.4g} pixels from there, so that parts would move beside their "
+      "places: put a stack of whole views beside it, or go on without them with --ignore LOCALFILE",
+      tilt.file().string(), full->at(0), full->at(1), images.stack.string(), off_x, off_y));
+}
+
 // Sets the local alignments, unless they are the transforms of the whole views, which AreTomo
 // writes there.
-void set_local(Project& project, CommandEntries& tilt, CommandEntries* newst) {
+void set_local(Project& project, CommandEntries& tilt, CommandEntries* newst,
+               const ImodImages& images) {
   const auto local = tilt.text("LOCALFILE");
   if (!local || !io::is_file(*tilt.path("LOCALFILE"))) return;
   if (newst != nullptr && newst->text("TransformFile") == local) {
@@ -157,6 +177,7 @@ void set_local(Project& project, CommandEntries& tilt, CommandEntries* newst) {
                     tilt.file().string()));
     return;
   }
+  require_place_of_local(tilt, images);
   project.set("--local", tilt.path("LOCALFILE")->string(), tilt.file(), "LOCALFILE");
 }
 
@@ -244,7 +265,7 @@ void read_imod_project(Project& project, const fs::path& tilt_com) {
   refuse_what_is_missing(project, tilt);
   const ImodImages images = choose_imod_images(project, tilt, newst);
   set_angles(project, tilt);
-  set_local(project, tilt, newst);
+  set_local(project, tilt, newst, images);
   set_imod_volume(project, tilt, images);
   set_excluded(project, tilt, images.num_sections);
   set_intensities(project, tilt);

@@ -209,6 +209,19 @@ TEST(ImodProject, AreTomosLocalFileIsThatOfTheWholeViews) {
   expect_parts(imod.warnings(), {"LOCALFILE", "AreTomo"});
 }
 
+TEST(ImodProject, PlacesOfLocalAlignmentsCountInWholeViews) {
+  const ImodFolder imod;
+  imod.folder.write("TSlocal.xf", "1 1 10 10 20 20\n");
+  std::filesystem::remove(imod.folder / "TS.st");
+  write_stack(imod.folder / "TS_ali.mrc", 40, 60, 5, some_value);
+  const std::string local = "LOCALFILE TSlocal.xf\nFULLIMAGE ";
+  imod.write_tilt(local + "60 90\nSUBSETSTART 10 15\n");
+  expect_parts(imod.refusal(), {"tilt.com", "FULLIMAGE", "10, 15 pixels", "--ignore LOCALFILE"});
+  imod.write_tilt(local + "42 63\nSUBSETSTART 1 2\n");
+  EXPECT_EQ(imod.refusal(), "");
+  EXPECT_TRUE(imod.values().contains("--local"));
+}
+
 TEST(ImodProject, FilesThatAreNamedAndNotThereAreWarnedOf) {
   const ImodFolder imod;
   imod.write_tilt("");

@@ -69,10 +69,20 @@ void write_volumes(const Run& run) {
   }
 }
 
+// Makes one linear volume after the other, too, and so twice if they share a factor.
 void write_linear_volumes(const Run& run) {
-  for (const Half half : tilt_series::kBothHalves)
-    baseline::write_linear_volume(half_measurement(half, run), run.options,
-                                  paths_of(run, half).linear_volume);
+  std::optional<float> largest;
+  if (run.options.volume.voxel_type == VoxelType::kInt16) {
+    largest = 0.0f;
+    for (const Half half : tilt_series::kBothHalves) {
+      const measurement::Measurement measured = half_measurement(half, run);
+      largest = std::max(*largest, baseline::LinearVolume(measured, run.options).largest_density());
+    }
+  }
+  for (const Half half : tilt_series::kBothHalves) {
+    const measurement::Measurement measured = half_measurement(half, run);
+    baseline::LinearVolume(measured, run.options).write(paths_of(run, half).linear_volume, largest);
+  }
 }
 
 // Writes the volumes and the maps, and measures how they agree.

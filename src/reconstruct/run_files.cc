@@ -84,6 +84,14 @@ std::vector<std::filesystem::path> result_files(const options::ReconstructOption
   return files;
 }
 
+std::vector<std::filesystem::path> replaceable_files(const options::ReconstructOptions& options) {
+  std::vector<std::filesystem::path> files = result_files(options);
+  if (files.empty()) return files;
+  for (const auto& picture : optional_pictures(output::output_paths(options.run.output)))
+    if (std::ranges::find(files, picture) == files.end()) files.push_back(picture);
+  return files;
+}
+
 void check_options(const options::ReconstructOptions& options) {
   base::require_no_faults(options.faults());
   if (options.run.output.empty() || !options.has_output) return;

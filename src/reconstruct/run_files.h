@@ -12,6 +12,9 @@ namespace tomofield::reconstruction {
 /// Returns all files that a run may write; none if the options name no output.
 std::vector<std::filesystem::path> result_files(const options::ReconstructOptions& options);
 
+/// Returns these, and the pictures that a run with --overwrite removes (remove_stale_files()).
+std::vector<std::filesystem::path> replaceable_files(const options::ReconstructOptions& options);
+
 /// Throws Error for faulty options. Throws Error also if a result would replace an input, or an
 /// existing file without --overwrite or --resume, or cannot be written at its path. Reads no file.
 void check_options(const options::ReconstructOptions& options);

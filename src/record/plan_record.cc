@@ -101,17 +101,19 @@ void write_plan(const fs::path& file, const PlanRecord& plan) {
 
 PlanRecord read_plan(const fs::path& file) { return read_plan_file(file, plan_from); }
 
-void write_grid(const fs::path& file, const Grid& grid) {
-  io::write_json(file, {{"grid", {{"size", grid.size}, {"voxel_A", grid.voxel_A}}}});
+void write_planned_volume(const fs::path& file, const PlannedVolume& volume) {
+  io::write_json(file, {{"grid", {{"size", volume.grid.size}, {"voxel_A", volume.grid.voxel_A}}},
+                        {"files", texts_of(volume.files)}});
 }
 
-Grid read_planned_grid(const fs::path& file) {
+PlannedVolume read_planned_volume(const fs::path& file) {
   return read_plan_file(file, [](const json& document) {
     const json& grid = document.at("grid");
     const auto size = grid.at("size").get<std::vector<std::int64_t>>();
     if (size.size() != 3) throw Error("'size' is not that of a volume");
-    return Grid{{size[0], size[1], size[2]},
-                io::number_at(grid, "voxel_A", 0, base::kLargestNumber)};
+    return PlannedVolume{
+        {{size[0], size[1], size[2]}, io::number_at(grid, "voxel_A", 0, base::kLargestNumber)},
+        files_at(document, "files")};
   });
 }
 

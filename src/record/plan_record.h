@@ -43,9 +43,15 @@ struct Grid {
   double voxel_A = 0;  ///< 0 if not known; some programs write 1 then
 };
 
-/// Writes the grid of a volume that is to be made, as `--dry-run --grid FILE` does.
-void write_grid(const std::filesystem::path& file, const Grid& grid);
-/// Reads what write_grid() has written. Throws Error for anything else.
-Grid read_planned_grid(const std::filesystem::path& file);
+/// The volume that a run is to make, and the files that it may write or remove.
+struct PlannedVolume {
+  Grid grid;
+  std::vector<std::filesystem::path> files = {};
+};
+
+/// Writes what `--dry-run --grid FILE` does.
+void write_planned_volume(const std::filesystem::path& file, const PlannedVolume& volume);
+/// Reads what write_planned_volume() has written. Throws Error for anything else.
+PlannedVolume read_planned_volume(const std::filesystem::path& file);
 
 }  // namespace tomofield::record

@@ -76,13 +76,15 @@ TEST(PlanRecord, OfOtherContentsIsRefusedWithItsName) {
   }
 }
 
-TEST(PlannedGrid, IsReadAsItIsWritten) {
+TEST(PlannedVolume, IsReadAsItIsWritten) {
   const ScratchDirectory directory;
   const auto file = directory / "grid.json";
-  write_grid(file, {{48, 24, 36}, 13.372});
-  EXPECT_EQ(read_planned_grid(file).size, (std::array<std::int64_t, 3>{48, 24, 36}));
-  EXPECT_EQ(read_planned_grid(file).voxel_A, 13.372);
-  EXPECT_THROW(read_planned_grid(directory.write("grid.json", R"({"grid": {"size": [1, 2]}})")),
+  write_planned_volume(file, {{{48, 24, 36}, 13.372}, {"a.mrc", "a.h5"}});
+  const PlannedVolume read = read_planned_volume(file);
+  EXPECT_EQ(read.grid.size, (std::array<std::int64_t, 3>{48, 24, 36}));
+  EXPECT_EQ(read.grid.voxel_A, 13.372);
+  EXPECT_EQ(read.files, (std::vector<std::filesystem::path>{"a.mrc", "a.h5"}));
+  EXPECT_THROW(read_planned_volume(directory.write("grid.json", R"({"grid": {"size": [1, 2]}})")),
                Error);
 }
 

@@ -123,6 +123,20 @@ void warn_of_others(std::span<const std::int64_t> sections, std::span<const Half
       std::ranges::min(correlations), usual));
 }
 
+// Warns of halves that differ in their scale, where one gain counts for both.
+void warn_of_other_scale(std::span<const HalfMoments> moments, const std::string& even,
+                         const std::string& odd) {
+  constexpr double kLargestRatio = 1.3;
+  double even_squares = 0, odd_squares = 0;
+  for (const HalfMoments& m : moments) even_squares += m.even_squares, odd_squares += m.odd_squares;
+  const double ratio = std::sqrt(even_squares / odd_squares);
+  if (ratio < kLargestRatio && ratio > 1 / kLargestRatio) return;
+  base::log_warning(fmt::format(
+      "the pixels of '{}' vary {:.3g} times as much as those of '{}', and both count in one scale: "
+      "give two sums, or two means, of equally many frames",
+      even, ratio, odd));
+}
+
 void require_same_size(const io::ImageStack& half, const io::ImageStack& all) {
   const io::MrcHeader &a = half.header(), &b = all.header();
   if (a.nx == b.nx && a.ny == b.ny && a.nz == b.nz) return;
@@ -208,6 +222,7 @@ void HalfStacks::match(std::span<const std::int64_t> sections, std::span<const H
   require_alike(found.correlation, names, all.name());
   warn_of_others(sections, moments, names, all.name());
   const bool is_ratio = are_counts(moments, found.slope);
+  if (!is_ratio) warn_of_other_scale(moments, stack(Half::kEven).name(), stack(Half::kOdd).name());
   const double gain = 2 * found.slope;
   for (std::size_t i = 0; i < sections.size(); ++i) {
     const HalfMoments& m = moments[i];

@@ -165,6 +165,20 @@ TEST(HalfStacks, SectionsOfAnotherViewAreNamed) {
   testing::expect_parts(warnings_of(stacks), {"in section 1 the sum", "shuffled.mrc", "all.mrc"});
 }
 
+TEST(HalfStacks, HalvesInOtherScalesAreNamed) {
+  // Values around zero tell nothing of the numbers of frames.
+  for (const auto& [even, odd, is_named] : {std::tuple{4.0f, 4.0f, false},
+                                            {5.0f, 4.0f, false},
+                                            {40.0f, 4.0f, true},
+                                            {4.0f, 12.0f, true}}) {
+    const Stacks stacks(even, odd, 1, 40);
+    const testing::WarningCatcher warnings;
+    stacks.matched();
+    EXPECT_EQ(warnings.text().find("count in one scale") != std::string::npos, is_named)
+        << even << " " << odd << ": " << warnings.text();
+  }
+}
+
 TEST(HalfStacks, StacksThatAreNoHalvesAreRefused) {
   const Stacks stacks(4, 4, 1), other(4, 4, 1, 26);
   const auto write = [&](const char* name, std::int64_t sections, const auto& value) {

@@ -142,7 +142,7 @@ class Surveyor {
     const io::MrcHeader& header = series_.stack().header();
     processes_.run_collectively([&] {
       require_plausible_scale(checks, series_.stack().name(), header.nx * header.ny);
-      warn_of_mask_without_effect(checks, options_.mask);
+      warn_of_mask(checks, options_.mask, header.nx * header.ny);
       for (std::size_t index = 0; index < num_views(); ++index) {
         const View& view = series_.views()[index];
         const std::string name = fmt::format("section {} (tilt {}°) of '{}'", view.section + 1,

@@ -54,14 +54,18 @@ void require_plausible_scale(std::span<const ViewCheck> found, const std::string
                     stack, static_cast<double>(kSmallestDifference), advice));
 }
 
-void warn_of_mask_without_effect(std::span<const ViewCheck> found,
-                                 const std::optional<std::filesystem::path>& mask) {
-  const auto masks_some = [](const ViewCheck& view) { return view.num_masked > 0; };
-  if (!mask || std::ranges::any_of(found, masks_some)) return;
-  base::log_warning(
-      fmt::format("the mask '{}' has no pixel that is 0 in the views, so it leaves none out: write "
-                  "0 where a pixel is left out, and 1 elsewhere",
-                  mask->string()));
+void warn_of_mask(std::span<const ViewCheck> found,
+                  const std::optional<std::filesystem::path>& mask, std::int64_t num_pixels) {
+  constexpr double kLargestPart = 0.8;
+  if (!mask) return;
+  double sum = 0;
+  for (const ViewCheck& view : found) sum += static_cast<double>(view.num_masked);
+  const double part = sum / (static_cast<double>(num_pixels) * static_cast<double>(found.size()));
+  if (part > 0 && part <= kLargestPart) return;
+  base::log_warning(fmt::format(
+      "the mask '{}' {}: write 0 where a pixel is left out, and 1 elsewhere", mask->string(),
+      part == 0 ? "has no pixel that is 0 in the views, so it leaves none out"
+                : fmt::format("leaves out {:.3g} % of the pixels of the views", 100 * part)));
 }
 
 void require_usable(const ViewCheck& found, const std::string& name, std::int64_t section,

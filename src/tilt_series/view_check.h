@@ -26,9 +26,9 @@ ViewCheck check_view(const PixelCensus& census, const MaskedImage& image);
 void require_plausible_scale(std::span<const ViewCheck> found, const std::string& stack,
                              std::int64_t num_pixels);
 
-/// Warns if a mask leaves out no pixel of any view.
-void warn_of_mask_without_effect(std::span<const ViewCheck> found,
-                                 const std::optional<std::filesystem::path>& mask);
+/// Warns if a mask leaves out no pixel of any view, or most of the `num_pixels` of the views.
+void warn_of_mask(std::span<const ViewCheck> found,
+                  const std::optional<std::filesystem::path>& mask, std::int64_t num_pixels);
 
 /// Throws Error if a view cannot be used, and warns of pixels that are NaN or infinite. `name`
 /// names the view, `section` is its number counted from 1, and it has `num_pixels` as recorded.

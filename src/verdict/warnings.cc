@@ -377,11 +377,11 @@ std::optional<Warning> unexplained(const Verdict& verdict, Alignment aligned_bef
 
 // Names a view that is explained far worse than the others, or returns an empty text.
 std::string foreign_view(const GivenInput& input) {
-  constexpr double kTimes = 5, kLeastResidual = 3;
+  constexpr double kTimes = 5, kLeastOfForeign = 3;
   if (input.residual.empty()) return "";
   const auto worst = std::ranges::max_element(input.residual);
   const double usual = base::median(input.residual);
-  if (*worst < kLeastResidual || *worst < kTimes * usual) return "";
+  if (*worst < kLeastOfForeign || *worst < kTimes * usual) return "";
   return fmt::format(
       "the view at {:.1f}° leaves {:.3g} times the variance of its noise, and the others {:.2g}: "
       "look whether it is damaged or of another specimen (--exclude leaves it out); else ",

@@ -533,3 +533,25 @@ def test_no_child_outlives_it(compare, number):
     run.communicate()
     wait_until(lambda: not is_alive(child))
     assert os.path.exists(os.path.join(folder, "ours.h5")), "the child saved its checkpoint"
+
+
+def test_foreign_files_stay_whatever_a_method_writes(series, truth):
+    """Runs write more files with some options, and remove pictures of earlier runs."""
+    folder = harness.fresh_directory("foreign")
+    quick = "q=reconstruct --epochs 1 --coarse-epochs 2 --prior tv --tv 5 "
+    for name, options in (("q_denoise.png", ""), ("q_fsc.png", ""), ("q_EVN.h5", "--split-tilts"),
+                          ("q_align.json", "--align refine"), ("q_alignment.json", "--alignment-json")):
+        foreign = os.path.join(folder, name)
+        with open(foreign, "w", encoding="utf-8") as file:
+            file.write("mine")
+        refused = harness.tomofield("compare", *series.input, *QUICK, "-o", folder, "--methods", "wbp", "--also",
+                                    quick + options)
+        assert refused.returncode == 2 and f"{name}' exists" in refused.stderr, refused.stderr
+        assert read(folder, name) == "mine"
+        os.remove(foreign)
+    half = shutil.copy(truth, os.path.join(folder, "q_EVN_Vol.mrc"))
+    before = open(half, "rb").read()
+    refused = harness.tomofield("compare", *series.input, *QUICK, "-o", folder, "--methods", "wbp", "--also",
+                                quick + "--split-tilts", "--truth", half, "--overwrite")
+    assert refused.returncode == 2 and "q_EVN_Vol.mrc" in refused.stderr, refused.stderr
+    assert open(half, "rb").read() == before

@@ -94,13 +94,11 @@ def test_a_box_that_no_machine_samples_is_refused_before_the_work():
     assert not pathlib.Path("large.mrc").exists()
 
 
-@pytest.mark.parametrize("size, says", (("20000,20000,10000", "its disk has only"),
-                                        ("1,1000000,1000000", "GiB of memory"),
-                                        ("16000000,1,200000", "its disk has only")))
-def test_a_volume_larger_than_its_disk_or_the_memory_is_refused_before_the_work(size, says):
+@pytest.mark.parametrize("size", ("20000,20000,10000", "1,1000000,1000000", "16000000,1,200000"))
+def test_a_volume_larger_than_its_disk_is_refused_before_the_work(size):
     result = harness.tomofield("export", "model.h5", "-o", "large.mrc", "--center", "16,16,8", "--size",
                                size, timeout=60)
-    assert result.returncode == 2 and says in result.stderr, result.stderr
+    assert result.returncode == 2 and "its disk has only" in result.stderr, result.stderr
     assert not pathlib.Path("large.mrc").exists()
 
 

@@ -280,11 +280,13 @@ def test_other_forms_of_the_volume(series):
     assert max(np.abs(volume).max() for volume in volumes) == 32000
     # One factor is in all of them. A half has more noise, so that its fit is somewhat smoother.
     assert abs(volumes[0].std() / np.mean([volume.std() for volume in volumes[1:]]) - 1) < 0.2
-    labels = []
-    for path in results.volumes:
-        with mrcfile.open(path) as file:
-            labels.append(file.get_labels())
-    assert labels[0] == labels[1] and "stored =" in labels[0][0]
+    for pair in (results.volumes, results.linear):
+        labels = []
+        for path in pair:
+            with mrcfile.open(path) as file:
+                labels.append(file.get_labels())
+        assert labels[0] == labels[1] and "stored =" in labels[0][0], labels
+    assert max(np.abs(read_volume(path)).max() for path in results.linear) == 32000
     for path in results.maps:
         assert read_volume(path).shape == volumes[0].shape
 

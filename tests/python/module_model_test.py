@@ -56,6 +56,37 @@ def test_a_turned_box_is_what_export_writes(series, model):
     np.testing.assert_array_equal(model.sample(box), mrcfile.read(series.folder / "box.mrc"))
 
 
+def test_boxes_lie_in_the_tomogram_whose_x_axis_tilt_is_turned_back(series, tmp_path):
+    """A part that is cut out lies where it is in the volume that reconstruct writes."""
+    series.run("reconstruct", "s.mrc", "--tlt", "s.tlt", "--thickness", 16, "--contrast", "bright",
+               "--no-margin", "--x-axis-tilt", 9, "--epochs", 2, "--coarse-epochs", 4, "-o", "leaning.mrc")
+    whole = mrcfile.read(series.folder / "leaning.mrc")
+    leaning = tomofield.Model(series.folder / "leaning.h5")
+    assert leaning.region() == tomofield.Box((16.0, 16.0, 8.0), (32, 32, 16))
+    close = {"atol": 1e-4 * np.abs(whole).max(), "rtol": 0}
+    np.testing.assert_allclose(leaning.sample(leaning.region()), whole, **close)
+    z, y, x = np.mgrid[4:12, 17:23, 5:25]
+    part = whole[4:12, 17:23, 5:25]
+    box = tomofield.Box((15, 20, 8), (20, 6, 8))
+    np.testing.assert_allclose(leaning.sample(box), part, **close)
+    points = np.stack([x, y, z], axis=-1).reshape(-1, 3) + 0.5
+    np.testing.assert_allclose(leaning.sample_points(points).reshape(part.shape), part, **close)
+    tomofield.export(leaning, tmp_path / "box.mrc", box=box)
+    series.run("export", "leaning.h5", "--box", "5,17,4,25,23,12", "-o", "corners.mrc")
+    series.run("export", "leaning.h5", "--center", "15,20,8", "--size", "20,6,8", "--rotate", "0,0,0",
+               "-o", "center.mrc")
+    for file in (tmp_path / "box.mrc", series.folder / "corners.mrc", series.folder / "center.mrc"):
+        with mrcfile.open(file) as found:
+            np.testing.assert_allclose(found.data, part, **close)
+            origin = [float(found.header.origin[axis]) for axis in "xyz"]
+            labels = [bytes(label).decode() for label in found.header.label]
+        np.testing.assert_allclose(origin, np.array([5, 17, 4]) * leaning.pixel_size_A, rtol=1e-5)
+        assert not any("turned: " in label for label in labels), labels
+    with pytest.raises(subprocess.CalledProcessError) as refused:
+        series.run("evaluate", "leaning.mrc", "--series", "s.mrc", "--tlt", "s.tlt", "--contrast", "bright")
+    assert "x-axis tilt of the series is turned back in 'leaning.mrc'" in refused.value.stderr
+
+
 def test_bad_input_is_refused_in_a_sentence(series, model):
     with pytest.raises(tomofield.Error, match="absent.h5"):
         tomofield.Model("absent.h5")

@@ -78,7 +78,11 @@ void rehearse(const baseline::BaselineOptions& options, const baseline::MethodFa
               const DryRun& dry_run) {
   const tilt_series::MeasuredSeries series(options.input());
   const Sizes sizes = print_plan(baseline::plan_baseline(series, options), options, method);
-  if (dry_run.grid) write_grid(*dry_run.grid, sizes);
+  if (!dry_run.grid) return;
+  const output::OutputPaths paths = output::output_paths(options.shared.run.output);
+  std::vector<std::filesystem::path> results = paths.pictures();
+  results.insert(results.end(), {paths.volume, paths.json});
+  write_grid(*dry_run.grid, sizes, std::move(results));
 }
 
 // Runs a baseline whose options have been checked.

@@ -118,26 +118,24 @@ OrientedBox box_between_corners(const std::string& corners, double voxel_px) {
   return field::box_between(low, high, voxel_px);
 }
 
-// Returns the box that the user describes, in the field.
-OrientedBox exported_box(const ExportArguments& arguments, const Model& model) {
+// Returns the place that the user describes.
+exchange::ExportPlace exported_place(const ExportArguments& arguments, const Model& model) {
   const auto& angles = arguments.rotation;
   const field::Rotation rotation =
       angles.empty() ? field::kNoRotation
                      : field::rotation_from_euler(angles[0], angles[1], angles[2]);
   exchange::ExportPlace place{.voxel_px = voxel_px_of(arguments, model),
                               .level = levelling_of(arguments, model)};
-  if (arguments.size.empty() && arguments.box.empty()) {
-    OrientedBox box = exchange::box_in_field(model, place);
-    if (!angles.empty()) box.field_from_box = rotation;
-    return box;
-  }
-  place.box = arguments.size.empty()
-                  ? box_between_corners(arguments.box, place.voxel_px)
-                  : OrientedBox{.centre_px = point(arguments.centre.data()),
-                                .size = {arguments.size[0], arguments.size[1], arguments.size[2]},
-                                .voxel_px = place.voxel_px};
-  place.box->field_from_box = rotation;
-  return exchange::box_in_field(model, place);
+  if (!arguments.size.empty())
+    place.box = {.centre_px = point(arguments.centre.data()),
+                 .size = {arguments.size[0], arguments.size[1], arguments.size[2]},
+                 .voxel_px = place.voxel_px};
+  else if (!arguments.box.empty())
+    place.box = box_between_corners(arguments.box, place.voxel_px);
+  else if (!angles.empty())
+    place.box = output::tomogram_box(model, place.voxel_px);
+  if (place.box) place.box->field_from_box = rotation;
+  return place;
 }
 
 // Writes the model again with factors in place of its vertices.
@@ -169,8 +167,9 @@ void write_compact(const ExportArguments& arguments) {
 }
 
 void export_volume(const ExportArguments& arguments, const Model& model) {
-  const OrientedBox box = exported_box(arguments, model);
-  exchange::export_volume(model, box, files_of(arguments));
+  const exchange::ExportPlace place = exported_place(arguments, model);
+  exchange::export_volume(model, exchange::box_in_field(model, place), files_of(arguments));
+  const OrientedBox box = place.box.value_or(output::tomogram_box(model, place.voxel_px));
   const bool is_xzy = arguments.choices.options.volume.axes == VolumeAxes::kXzy;
   print("{}: {} × {} × {} voxels ({}) of {:.6g} Å about {:.6g}, {:.6g}, {:.6g} px\n",
         arguments.output.string(), box.size[0], box.size[is_xzy ? 2 : 1], box.size[is_xzy ? 1 : 2],
@@ -215,7 +214,7 @@ void run_export(ExportArguments& arguments) {
 }
 
 void add_box_options(CLI::App& command, ExportArguments& arguments) {
-  const char* group = "Box (pixels of the model: the binned view at zero tilt, z from 0 up)";
+  const char* group = "Box (pixels of the tomogram of the whole binned view, z from 0 up)";
   const CLI::Validator finite(
       [](std::string& text) {
         return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not finite";

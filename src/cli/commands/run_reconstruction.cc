@@ -25,6 +25,7 @@
 #include "output/volume.h"
 #include "plan/plan.h"
 #include "reconstruct/reconstruct.h"
+#include "reconstruct/run_files.h"
 #include "tomofield/error.h"
 #include "verdict/verdict.h"
 
@@ -208,7 +209,9 @@ void run_reconstruction(const options::ReconstructOptions& options, const DryRun
     show_plan(preview.plan);
     if (!processes.is_root()) return;
     print_estimate(preview.estimate, processes.size());
-    if (dry_run.grid) write_grid(*dry_run.grid, sizes_of(preview.plan, options));
+    if (dry_run.grid)
+      write_grid(*dry_run.grid, sizes_of(preview.plan, options),
+                 reconstruction::replaceable_files(options));
     return;
   }
   const output::OutputPaths paths = output::output_paths(options.run.output);

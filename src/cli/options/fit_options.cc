@@ -57,8 +57,9 @@ void add_grid_option(CLI::App& command, std::optional<std::filesystem::path>& fi
       ->group(kHelpAllGroup);
 }
 
-void write_grid(const std::filesystem::path& file, const Sizes& sizes) {
-  record::write_grid(file, {voxels_of(sizes), sizes.pixel_size_A});
+void write_grid(const std::filesystem::path& file, const Sizes& sizes,
+                std::vector<std::filesystem::path> results) {
+  record::write_planned_volume(file, {{voxels_of(sizes), sizes.pixel_size_A}, std::move(results)});
 }
 
 }  // namespace tomofield::cli

@@ -34,8 +34,9 @@ void print_sizes(const Sizes& sizes);
 /// Registers --grid, which goes with --dry-run.
 void add_grid_option(CLI::App& command, std::optional<std::filesystem::path>& file);
 
-/// Writes the voxels that the tomogram will have along the axes of its file, and their size, for
-/// programs (record::read_planned_grid()).
-void write_grid(const std::filesystem::path& file, const Sizes& sizes);
+/// Writes the voxels that the tomogram will have along the axes of its file, their size, and the
+/// files that the run may write or remove, for programs (record::read_planned_volume()).
+void write_grid(const std::filesystem::path& file, const Sizes& sizes,
+                std::vector<std::filesystem::path> results);
 
 }  // namespace tomofield::cli

@@ -102,6 +102,9 @@ double cubic_voxel_size_A(const MrcHeader& header, const std::filesystem::path& 
 /// A label of volumes that were turned before they were sampled. Their ORIGIN is 0, and no place.
 inline constexpr const char* kLabelOfTurnedBox = "turned: ORIGIN is not its place";
 
+/// A label of volumes of a series whose x-axis tilt was turned back.
+inline constexpr const char* kLabelOfXTilt = "the x-axis tilt of the series is turned back";
+
 /// Tells whether a stack went through IMOD's ctfphaseflip, by its labels or IMOD's flag.
 bool is_phase_flipped(const MrcHeader& header);
 

@@ -98,9 +98,7 @@ struct MrcWriter::Impl {
   float largest = 0.0f;  // finite magnitude, before it was stored as a float of 16 bits
 
   Impl(const std::filesystem::path& path, const MrcSpec& spec, const distributed::Communicator& all)
-      : header(header_of(spec, path.string())),
-        processes(all),
-        rows(moments_of_rows(header, path.string())) {
+      : header(header_of(spec, path.string())), processes(all) {
     std::filesystem::path temporary;
     processes.run_collectively([&] {
       if (!processes.is_root()) return;
@@ -108,6 +106,11 @@ struct MrcWriter::Impl {
       temporary = target->temporary_path();
       const std::int64_t bytes = expected_file_bytes(header, path.string());
       require_room(folder_of(temporary), path, bytes);
+    });
+    processes.run_collectively([&] {
+      rows = moments_of_rows(header, path.string());
+      if (!processes.is_root()) return;
+      const std::int64_t bytes = expected_file_bytes(header, path.string());
       file.emplace(temporary, PositionedFile::Access::kReadWrite);
       file->resize(bytes);
     });

@@ -95,6 +95,12 @@ TEST(SeriesMasks, AMaskOfAnotherSizeOrWithoutAMeasurementIsRefused) {
   const testing::WarningCatcher warnings;
   TiltSeries{options};
   testing::expect_parts(warnings.text(), {"ones.mrc", "has no pixel that is 0"});
+  options.mask = write_stack(
+      scratch / "inverted.mrc", kWidth, kHeight, 3,
+      [](std::int64_t x, auto, auto) { return x < 6 ? 1.0f : 0.0f; }, kPixelSize);
+  const testing::WarningCatcher of_inverted;
+  TiltSeries{options};
+  testing::expect_parts(of_inverted.text(), {"inverted.mrc", "leaves out 90.6 %"});
   options.mask = write_stack(scratch / "small.mrc", kWidth, kHeight, 2, some_value, kPixelSize);
   expect_refusal(options, {"small.mrc", "64 × 48 pixels and 2 sections", "a.st", "and 3"});
   options.mask = write_stack(
