@@ -159,7 +159,7 @@ def chosen(choices: _core.Choices, given: Mapping[str, object]) -> _core.Choices
 
 def no_option(name: str) -> str:
     """Return a sentence with the options that are most like this one, if there are any."""
-    return f"there is no option '{name}'{suggestion(_core.nearest_options(name))}"
+    return f"there is no option '{said(name)}'{suggestion(_core.nearest_options(said(name)))}"
 
 
 def suggestion(nearest: Sequence[str]) -> str:

@@ -194,7 +194,10 @@ Outcome compare_methods(const CompareOptions& options, const RunHooks& hooks) {
                                             : stored_rows(plan.runs, options.folder);
   check_folder(options, rows);
   if (!rehearse(options, hooks, rows)) return Outcome::kStoppedBeforeRuns;
-  if (options.overwrite) remove_results(options, rows);
+  if (options.overwrite) {
+    remove_results(options, rows);
+    claim_rows(rows);
+  }
   if (!run_rows(options.program, hooks, rows)) return Outcome::kStopped;
   const std::vector<Row> volumes(
       rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(options.methods.size()));

@@ -90,6 +90,13 @@ std::vector<Row> stored_rows(const std::vector<Run>& runs, const fs::path& folde
   return rows;
 }
 
+void claim_rows(std::vector<Row>& rows) {
+  for (Row& row : rows) {
+    row.state = {.progress = Progress::kStopped, .costs = {}};
+    write_row(state_of(row), row.origin, row.state);
+  }
+}
+
 bool is_done(const Row& row) {
   return row.state.progress == Progress::kFinished && fs::exists(row.volume) &&
          fs::exists(paths_of(row).json);

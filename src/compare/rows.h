@@ -42,6 +42,10 @@ std::vector<Row> stored_rows(const std::vector<Run>& runs, const std::filesystem
 /// Returns a row a run, as if the folder were empty.
 std::vector<Row> new_rows(const std::vector<Run>& runs, const std::filesystem::path& folder);
 
+/// Notes that the files of all rows are those of this comparison from now on, as --overwrite says,
+/// whichever of their runs begin before it is stopped.
+void claim_rows(std::vector<Row>& rows);
+
 /// Returns true if the row is finished and its files exist.
 bool is_done(const Row& row);
 

@@ -140,10 +140,16 @@ PlannedRuns plan_runs(const CompareOptions& options, const tilt_series::PlannedS
 bool rehearse(const CompareOptions& options, const RunHooks& hooks, const std::vector<Row>& rows) {
   const io::ScratchFolder scratch(options.folder, ".tomofield-rehearsal");
   std::optional<NamedGrid> main;
+  std::vector<fs::path> files;
   for (const Row& row : rows) {
     const auto planned = volume_to_be(options, hooks, row, scratch);
     if (!planned) return false;
     check_planned_files(options, rows, row, planned->files);
+    std::vector<fs::path> of_row = files_of(row);
+    of_row.insert(of_row.end(), planned->files.begin(), planned->files.end());
+    std::ranges::sort(of_row);
+    of_row.erase(std::unique(of_row.begin(), of_row.end()), of_row.end());
+    files.insert(files.end(), of_row.begin(), of_row.end());
     if (!main) {
       main = {row.run.name, planned->grid};
       const bool is_a_part =
@@ -153,6 +159,7 @@ bool rehearse(const CompareOptions& options, const RunHooks& hooks, const std::v
     }
     require_one_grid(*main, {row.run.name, planned->grid});
   }
+  io::require_distinct(files);
   return true;
 }
 

@@ -69,6 +69,12 @@ std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcRead
     lies_in_b = lies_in_b && offset[axis] >= 0 && offset[axis] + size_a[axis] <= size_b[axis];
     lies_in_a = lies_in_a && offset[axis] <= 0 && offset[axis] + size_a[axis] >= size_b[axis];
   }
+  if (are_ours && size_a != size_b && !lies_in_a && !lies_in_b &&
+      !have_axes_in_another_order(size_a, size_b))
+    throw Error(fmt::format(
+        "'{}' and '{}' are of two regions of one volume, and neither is a part of the other: the "
+        "latter begins {}, {}, {} voxels after the former (ORIGIN), so give volumes of one region",
+        a.path().string(), b.path().string(), -offset[0], -offset[1], -offset[2]));
   if (are_ours && size_a == size_b && offset != Offset{})
     throw Error(fmt::format(
         "'{}' and '{}' are of two places of one volume: the latter begins {}, {}, {} voxels after "

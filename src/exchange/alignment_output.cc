@@ -39,7 +39,8 @@ void write_alignment_results(const tilt_series::PlannedSeries& series,
   const io::MrcHeader& header = series.stack().header();
   output::write_alignment_files(
       series, {header.nx, header.ny, header.nz},
-      output::alignment_files(output::output_paths(options.run.output).alignment_prefix));
+      output::alignment_files(output::output_paths(options.run.output).alignment_prefix),
+      options.specimen.axis_x);
   report::write_alignment_picture(report::alignment_curves(*options.alignment),
                                   output::output_paths(options.run.output).alignment_picture);
   write_relion_alignment(series, options);

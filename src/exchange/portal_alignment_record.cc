@@ -5,6 +5,7 @@
 
 #include "io/images/mrc.h"
 #include "io/json.h"
+#include "output/alignment_files.h"
 #include "output/output_paths.h"
 
 namespace tomofield::exchange {
@@ -38,15 +39,20 @@ Place place_of(const io::MrcHeader& header, VolumeAxes axes, double thickness_A)
   return place;
 }
 
-json section_json(const tilt_series::PlannedSeries& series, std::size_t index, int hand) {
+// Offsets count from the tilt axis, as that of the volume does.
+json section_json(const tilt_series::PlannedSeries& series, std::size_t index,
+                  const SpecimenOptions& specimen) {
   const tilt_series::View& view = series.views()[index];
-  const geometry::RawFromAligned m = series.raw_from_aligned(index);
+  const geometry::RawFromAligned m =
+      series.raw_from_aligned(index)
+          .binned(1.0 / series.bin_factor())
+          .counted_from(output::axis_from_middle_px(series, specimen.axis_x));
   return {{"z_index", view.section},
-          {"tilt_angle", hand * view.tilt_deg},
-          {"volume_x_rotation", hand * view.x_tilt_deg},
+          {"tilt_angle", specimen.hand * view.tilt_deg},
+          {"volume_x_rotation", specimen.hand * view.x_tilt_deg},
           {"in_plane_rotation", {{m.m11, m.m12}, {m.m21, m.m22}}},
-          {"x_offset", m.shift_x_px * series.bin_factor()},
-          {"y_offset", m.shift_y_px * series.bin_factor()}};
+          {"x_offset", m.shift_x_px},
+          {"y_offset", m.shift_y_px}};
 }
 
 }  // namespace
@@ -67,7 +73,7 @@ void write_portal_alignment(const tilt_series::PlannedSeries& series,
   for (std::size_t a = 0; a < 3; ++a) offset_A[a] = place.middle_A[a] - middle_of_series_A[a];
   json sections = json::array();
   for (std::size_t i = 0; i < series.views().size(); ++i)
-    sections.push_back(section_json(series, i, specimen.hand));
+    sections.push_back(section_json(series, i, specimen));
   const json record{
       {"alignment_type", "GLOBAL"},
       {"format", "TOMOFIELD"},

@@ -18,6 +18,11 @@ struct RawFromAligned {
   }
   /// Returns the angle of the rotation that is nearest to M in least squares.
   double rotation_rad() const { return std::atan2(m21 - m12, m11 + m22); }
+  /// Returns the map for places that count from a point which lies `x_px` to the right of the
+  /// centre of the aligned image, such as the tilt axis.
+  RawFromAligned counted_from(double x_px) const {
+    return {m11, m12, m21, m22, shift_x_px + m11 * x_px, shift_y_px + m21 * x_px};
+  }
   /// Returns the map between the same images with pixels that are `factor` times larger.
   RawFromAligned binned(double factor) const {
     return {m11, m12, m21, m22, shift_x_px / factor, shift_y_px / factor};

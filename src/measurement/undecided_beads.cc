@@ -40,8 +40,10 @@ void hide_beads(Measurement& measurement, const distributed::Communicator& proce
   if (measurement.undecided_beads.empty()) return;
   own_rays(measurement).hide(measurement.undecided_beads);
   record_masks(all_views(measurement), processes, measurement);
-  base::log_info(fmt::format(
-      "the {} are masked: {:.1f} % of all rays carry no loss", describe_beads(measurement.masks),
+  base::log_warning(fmt::format(
+      "the {} are masked: {:.1f} % of all rays carry no loss, and what they show is not in the "
+      "tomogram (--bead-diameter 0 keeps them if they are the specimen)",
+      describe_beads(measurement.masks),
       100 * std::reduce(measurement.masked_part.begin(), measurement.masked_part.end()) /
           measurement.geometry.num_views()));
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "tilt_series/planned_series.h"
@@ -18,6 +19,10 @@ struct AlignmentFiles {
 
 /// Returns the names PREFIX.xf, PREFIX.tlt, PREFIX.xtilt and PREFIX.aln.
 AlignmentFiles alignment_files(const std::filesystem::path& prefix);
+
+/// Returns how far the tilt axis lies to the right of the middle of the aligned views, in pixels
+/// before binning. `axis_x` is that of SpecimenOptions; none: it lies in the middle.
+double axis_from_middle_px(const tilt_series::PlannedSeries& series, std::optional<double> axis_x);
 
 /// Writes how a series is aligned, as IMOD and AreTomo have it (docs/geometry.md). `raw_size` are
 /// the width and the height of the recorded views before binning, in pixels, and the number of
@@ -35,9 +40,10 @@ AlignmentFiles alignment_files(const std::filesystem::path& prefix);
 ///   this moves a corner of a view by more than 0.1 pixels before binning, a warning says how far.
 ///   There is no .aln of mirrored views, and a warning says so.
 ///
-/// The angles include --tilt-offset and --x-axis-tilt, which are not to be applied again.
+/// The angles include --tilt-offset and --x-axis-tilt, and the shifts the place of the tilt axis
+/// (`axis_x`, SpecimenOptions), so that it is in the middle: these are not to be applied again.
 void write_alignment_files(const tilt_series::PlannedSeries& series,
-                           const std::array<std::int64_t, 3>& raw_size,
-                           const AlignmentFiles& files);
+                           const std::array<std::int64_t, 3>& raw_size, const AlignmentFiles& files,
+                           std::optional<double> axis_x = {});
 
 }  // namespace tomofield::output

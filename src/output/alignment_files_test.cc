@@ -163,6 +163,13 @@ TEST(AlignmentFiles, HaveTheNumbersWorkedByHand) {
     EXPECT_EQ((std::array{row.rotation_deg, row.magnification}), (std::array{90.0, 1.0}));
     EXPECT_EQ((std::array{row.shift_x_px, row.shift_y_px}), (std::array{4.0, 6.0}));
   }
+  // An axis 3 px to the right of the middle of the aligned views, which are 28 px wide, moves the
+  // raw place by M (3, 0) = (0, 3).
+  write_alignment_files(series, kRawSize, files, 17.0);
+  for (const io::ImodTransform& t : io::read_imod_transforms(files.xf))
+    EXPECT_EQ((std::array{t.shift_x_px, t.shift_y_px}), (std::array{-9.0, 4.0}));
+  for (const io::AreTomoRow& row : io::read_aretomo_alignment(files.aln, true).rows)
+    EXPECT_EQ((std::array{row.shift_x_px, row.shift_y_px}), (std::array{4.0, 9.0}));
 }
 
 // The tilts are −25°, −15°, 15° and 25° at the sections 1, 2, 5 and 6.

@@ -30,7 +30,9 @@ void read_aretomo_project(Project& project) {
   const io::AreTomoAlignment alignment = io::read_aretomo_alignment(aln, /*needs_tilt=*/false);
   project.set("stack", find_stack(aln).string(), aln, "RawSize");
   project.set("--aln", aln.string(), aln, "SEC");
-  set_transfer_files(project, aln.parent_path(), aln.stem().string());
+  const fs::path stem = aln.stem();
+  const fs::path name = has_extension_of_stack(stem) ? stem.stem() : stem;  // T1.aln, T1.st.aln
+  set_transfer_files(project, aln.parent_path(), name.string());
   if (alignment.thickness)
     project.set("--thickness", fmt::format("{}", *alignment.thickness), aln, "Thickness");
   if (alignment.alpha_offset_deg != 0) {

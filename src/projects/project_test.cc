@@ -91,6 +91,16 @@ TEST(AreTomoProject, ThicknessAndStack) {
   expect_parts(project.warnings()[0], {"AlphaOffset", "1.5"});
 }
 
+TEST(AreTomoProject, MayBeNamedAfterTheFileOfItsStack) {
+  const ScratchDirectory folder;
+  const auto aln = folder.write(
+      "T1.st.aln", "# RawSize = 16 12 2\n1 0 1 0 0 0 0 0 0 -10\n2 0 1 0 0 0 0 0 0 10\n");
+  write_stack(folder / "T1.st", 16, 12, 2, some_value);
+  const auto ctf = folder.write("T1_CTF.txt", "");
+  const Project project = *read_project({.path = aln});
+  EXPECT_EQ(project.value_of("--ctf"), ctf.string());
+}
+
 TEST(MdocProject, SetsTheTargetOfTheDefocusWhereNothingMeasuresIt) {
   const ScratchDirectory folder;
   write_stack(folder / "TS.mrc", 16, 12, 1, some_value);

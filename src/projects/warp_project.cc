@@ -2,6 +2,7 @@
 
 #include "io/images/mrc_format.h"
 #include "io/images/view_images.h"
+#include "io/lower_extension.h"
 #include "io/tables/view_table.h"
 #include "projects/formats.h"
 #include "projects/stacks.h"
@@ -31,7 +32,7 @@ void read_warp_project(Project& project) {
   const std::filesystem::path path = project.request().path;
   const io::ViewTable table = io::read_view_table(path);
   for (const io::ImageInFile& image : io::find_view_images(table)) project.add_file(image.file);
-  const bool is_xml = path.extension() != ".tomostar";
+  const bool is_xml = io::lower_extension(path) != ".tomostar";
   project.set("stack", path.string(), path, is_xml ? "MoviePath" : "wrpMovieName");
   const bool has_defocus = set_transfer_of_views(project, table, "GridCTF");
   const bool may_transfer = has_defocus || project.request().has_transfer;

@@ -255,8 +255,7 @@ def test_overwrite_leaves_nothing_old(compare):
     run = compare(folder, "--overwrite", run=harness.start)
     wait_for_line(run, "sirt: running")
     assert "without --overwrite" in stop(run)
-    old = {"report.html", "comparison.json", "comparison.csv", "ours.mrc", "ours.row.json",
-           "ours.h5"}
+    old = {"report.html", "comparison.json", "comparison.csv", "ours.mrc", "ours.h5"}
     assert not old & set(os.listdir(folder)), os.listdir(folder)
     said = compare(folder).stderr
     assert "sirt: running" in said and "ours: running" in said, said
@@ -549,9 +548,40 @@ def test_foreign_files_stay_whatever_a_method_writes(series, truth):
         assert refused.returncode == 2 and f"{name}' exists" in refused.stderr, refused.stderr
         assert read(folder, name) == "mine"
         os.remove(foreign)
+    store = os.path.join(folder, "s.zarr")
+    harness.succeed("baseline", "wbp", *series.input, *QUICK, "--zarr", "-o", os.path.join(folder, "s.mrc"))
+    for name in os.listdir(folder):
+        if name != "s.zarr":
+            os.remove(os.path.join(folder, name))
+    before = {name: os.stat(os.path.join(store, name)).st_mtime_ns for name in os.listdir(store)}
+    refused = harness.tomofield("compare", *series.input, *QUICK, "-o", folder, "--methods", "wbp", "--also",
+                                "s=baseline sirt --iterations 3 --zarr")
+    assert refused.returncode == 2 and "s.zarr' exists" in refused.stderr, refused.stderr
+    assert before == {name: os.stat(os.path.join(store, name)).st_mtime_ns for name in os.listdir(store)}
+    shutil.rmtree(store)
+    refused = harness.tomofield("compare", *series.input, *QUICK, "-o", folder, "--methods", "wbp", "--also",
+                                "q_align=baseline wbp --cutoff 0.3", "--also", quick + "--align refine")
+    assert refused.returncode == 2 and "two results would both be" in refused.stderr, refused.stderr
     half = shutil.copy(truth, os.path.join(folder, "q_EVN_Vol.mrc"))
     before = open(half, "rb").read()
     refused = harness.tomofield("compare", *series.input, *QUICK, "-o", folder, "--methods", "wbp", "--also",
                                 quick + "--split-tilts", "--truth", half, "--overwrite")
     assert refused.returncode == 2 and "q_EVN_Vol.mrc" in refused.stderr, refused.stderr
     assert open(half, "rb").read() == before
+
+
+def test_a_stopped_overwrite_goes_on_without_it(series):
+    """Files of the older run that no run has replaced yet are the comparison's own."""
+    folder = harness.fresh_directory("stopped_overwrite")
+    command = ["compare", *series.input, *QUICK, "-o", folder, "--threads", 1, "--methods", "sirt", "--also",
+               "q=reconstruct --epochs 1 --coarse-epochs 2 --prior tv --tv 5 --split-tilts"]
+    harness.succeed(*command)
+    assert os.path.exists(os.path.join(folder, "q_fsc.png"))
+    program = harness.start(*command, "--overwrite")
+    while program.poll() is None and os.path.exists(os.path.join(folder, "report.html")):
+        time.sleep(0.01)
+    program.send_signal(signal.SIGINT)
+    program.communicate(timeout=120)
+    if program.returncode != 0:  # it was not finished before the signal came
+        harness.succeed(*command)
+    assert os.path.exists(os.path.join(folder, "report.html"))

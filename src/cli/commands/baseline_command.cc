@@ -82,6 +82,7 @@ void rehearse(const baseline::BaselineOptions& options, const baseline::MethodFa
   const output::OutputPaths paths = output::output_paths(options.shared.run.output);
   std::vector<std::filesystem::path> results = paths.pictures();
   results.insert(results.end(), {paths.volume, paths.json});
+  if (options.shared.volume.zarr) results.push_back(output::zarr_path(paths.volume));
   write_grid(*dry_run.grid, sizes, std::move(results));
 }
 

@@ -8,6 +8,7 @@
 #include "base/threads/parallel.h"
 #include "cli/options/number_checks.h"
 #include "io/saving/output_files.h"
+#include "tomofield/error.h"
 
 namespace tomofield::cli {
 
@@ -41,6 +42,23 @@ std::vector<option_table::GivenOption> given_options(const CLI::App& command,
   return given;
 }
 
+namespace {
+
+// Refuses a file within a result that is a folder, such as an OME-Zarr.
+void require_outside_results(const std::filesystem::path& file,
+                             const std::vector<std::filesystem::path>& results) {
+  std::error_code unknown;
+  const auto place = std::filesystem::weakly_canonical(file, unknown).string();
+  for (const std::filesystem::path& result : results) {
+    const auto folder = std::filesystem::weakly_canonical(result, unknown).string() + "/";
+    if (place.starts_with(folder))
+      throw Error(fmt::format("'{}' would lie in the result '{}': give another name", file.string(),
+                              result.string()));
+  }
+}
+
+}  // namespace
+
 void check_extra_files(std::initializer_list<ExtraFile> files,
                        const std::vector<std::filesystem::path>& results, const SeriesFiles& input,
                        const RunOptions& run) {
@@ -50,6 +68,7 @@ void check_extra_files(std::initializer_list<ExtraFile> files,
     io::check_output_files({*file}, io::input_files(input), run.overwrite,
                            fmt::format("give another name with {}{}", flag,
                                        run.resume ? "" : ", or --overwrite to replace it"));
+    require_outside_results(*file, results);
     all.push_back(*file);
     io::require_distinct(all);
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "io/lower_extension.h"
 #include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
@@ -18,8 +19,9 @@ bool has_ctffind_comments(const std::filesystem::path& path) {
 }
 
 CtfTable read_any(const std::filesystem::path& path) {
-  if (path.extension() == ".star") return read_relion_ctf(path);
-  if (path.extension() == ".xml") return read_warp_ctf(path);
+  const std::string extension = lower_extension(path);
+  if (extension == ".star") return read_relion_ctf(path);
+  if (extension == ".xml") return read_warp_ctf(path);
   return has_ctffind_comments(path) ? read_ctffind(path) : read_imod_defocus(path);
 }
 
