@@ -141,7 +141,7 @@ void require_place(const std::filesystem::path& path, const measurement::Measure
         "'{}' was turned before it was sampled, and is projected as it lies in the views: give "
         "the volume that `reconstruct` wrote, or `export` without an angle",
         path.string()));
-  if (std::ranges::count(volume.header().labels, io::kLabelOfXTilt) > 0)
+  if (io::is_in_labels(volume.header(), io::kLabelOfXTilt))
     throw Error(fmt::format(
         "the x-axis tilt of the series is turned back in '{}', which a projection into the views "
         "does not know: give a volume that was made without --xtilt and --x-axis-tilt",

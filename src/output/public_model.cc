@@ -119,6 +119,7 @@ std::vector<float> Model::sample_points(std::span<const Point> points) const {
                       point[0], point[1], point[2]));
   const output::VolumeFrame frame(impl_->model);
   std::vector<Point> in_field;
+  in_field.reserve(points.size());
   for (const Point& point : points) in_field.push_back(frame.to_field(point));
   std::vector<float> values = output::sample_points(impl_->model, in_field);
   output::to_output(impl_->model, values);

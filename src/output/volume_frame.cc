@@ -101,8 +101,7 @@ void require_own(const ModelInfo& model, const alignment::AlignmentRecord& recor
   }
   base::log_warning(
       fmt::format("the model was not aligned by '{}', which --align wrote for the same tilts: it "
-                  "is levelled as "
-                  "if it was of its views (--level PITCH,X_TILT gives other angles)",
+                  "is levelled as if it was of its views (--level PITCH,X_TILT gives other angles)",
                   path.string()));
 }
 

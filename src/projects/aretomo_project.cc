@@ -30,9 +30,7 @@ void read_aretomo_project(Project& project) {
   const io::AreTomoAlignment alignment = io::read_aretomo_alignment(aln, /*needs_tilt=*/false);
   project.set("stack", find_stack(aln).string(), aln, "RawSize");
   project.set("--aln", aln.string(), aln, "SEC");
-  const fs::path stem = aln.stem();
-  const fs::path name = has_extension_of_stack(stem) ? stem.stem() : stem;  // T1.aln, T1.st.aln
-  set_transfer_files(project, aln.parent_path(), name.string());
+  set_transfer_files(project, aln.parent_path(), series_name_beside(aln));
   if (alignment.thickness)
     project.set("--thickness", fmt::format("{}", *alignment.thickness), aln, "Thickness");
   if (alignment.alpha_offset_deg != 0) {

@@ -124,7 +124,7 @@ void warn_of_corrections(Project& project, const fs::path& aligned) {
   }
 }
 
-// By how much newstack reduces the views. Without an entry it does not.
+// Says by how much newstack reduces the views, which without an entry it does not.
 struct Reduction {
   const char* entry = "BinByFactor";
   double factor = 1.0;

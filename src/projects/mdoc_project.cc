@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "io/is_file.h"
 #include "io/tables/alignment_files.h"
 #include "io/tables/mdoc_images.h"
 #include "projects/formats.h"
@@ -54,10 +53,7 @@ void read_mdoc_project(Project& project) {
     project.set("stack", mdoc.string(), mdoc, "SubFramePath");
   }
   project.set("--mdoc", mdoc.string(), mdoc, "ZValue");
-  fs::path stem = mdoc.stem();
-  // "TS_01" of "TS_01.mrc.mdoc"; the part after a point may belong to the name.
-  if (has_extension_of_stack(stem) || io::is_file(mdoc.parent_path() / stem)) stem = stem.stem();
-  if (!set_transfer_files(project, mdoc.parent_path(), stem.string()))
+  if (!set_transfer_files(project, mdoc.parent_path(), series_name_beside(mdoc)))
     set_target_defocus(project, mdoc, contents);
   if (contents.voltage_kV)
     project.set("--voltage", fmt::format("{}", *contents.voltage_kV), mdoc, "Voltage");

@@ -45,8 +45,11 @@ std::optional<fs::path> find_stack_beside(const fs::path& file, const std::strin
   return std::nullopt;
 }
 
-bool has_extension_of_stack(const fs::path& name) {
-  return std::ranges::count(kExtensions, io::lower_extension(name)) > 0;
+std::string series_name_beside(const fs::path& file) {
+  const fs::path stem = file.stem();
+  const bool is_stack_name = std::ranges::count(kExtensions, io::lower_extension(stem)) > 0 ||
+                             io::is_file(file.parent_path() / stem);
+  return (is_stack_name ? stem.stem() : stem).string();
 }
 
 bool are_other_pixels(double stated_A, double in_header_A) {

@@ -15,8 +15,9 @@ namespace tomofield::projects {
 std::optional<std::filesystem::path> find_stack_beside(const std::filesystem::path& file,
                                                        const std::string& named);
 
-/// Tells whether a name ends as those of stacks do, such as ".mrc".
-bool has_extension_of_stack(const std::filesystem::path& name);
+/// Returns the name of the series of a file that may be named after its stack: "TS_01" of
+/// "TS_01.mdoc" and of "TS_01.mrc.mdoc". A part after a point that names no stack belongs to it.
+std::string series_name_beside(const std::filesystem::path& file);
 
 /// A pixel size that an entry of a file states.
 struct StatedPixelSize {

@@ -100,17 +100,17 @@ struct MrcWriter::Impl {
   Impl(const std::filesystem::path& path, const MrcSpec& spec, const distributed::Communicator& all)
       : header(header_of(spec, path.string())), processes(all) {
     std::filesystem::path temporary;
+    std::int64_t bytes = 0;
     processes.run_collectively([&] {
       if (!processes.is_root()) return;
       target.emplace(path);
       temporary = target->temporary_path();
-      const std::int64_t bytes = expected_file_bytes(header, path.string());
+      bytes = expected_file_bytes(header, path.string());
       require_room(folder_of(temporary), path, bytes);
     });
     processes.run_collectively([&] {
       rows = moments_of_rows(header, path.string());
       if (!processes.is_root()) return;
-      const std::int64_t bytes = expected_file_bytes(header, path.string());
       file.emplace(temporary, PositionedFile::Access::kReadWrite);
       file->resize(bytes);
     });
