@@ -218,7 +218,6 @@ BaselinePlan plan_baseline(const tilt_series::PlannedSeries& series,
                            const BaselineOptions& options) {
   const measurement::Measurement planned =
       measurement::plan_measurement(series, options.shared.specimen);
-  measurement::require_pixels(planned.geometry.width, planned.geometry.height);
   if (planned.x_tilt_deg != 0.0) {
     throw Error(fmt::format(
         "the series has an x-axis tilt of {}°, which a linear volume or a baseline does not turn "

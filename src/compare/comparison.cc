@@ -196,6 +196,7 @@ Outcome compare_methods(const CompareOptions& options, const RunHooks& hooks) {
   if (!rehearse(options, hooks, rows)) return Outcome::kStoppedBeforeRuns;
   if (options.overwrite) {
     remove_results(options, rows);
+    warn_of_other_runs(options, rows);
     claim_rows(rows);
   }
   if (!run_rows(options.program, hooks, rows)) return Outcome::kStopped;

@@ -1,12 +1,14 @@
 #include "compare/folder.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
 #include <string>
 
+#include "base/log.h"
 #include "compare/pictures.h"
 #include "io/saving/output_files.h"
 #include "io/saving/output_target.h"
@@ -83,6 +85,21 @@ void remove_results(const CompareOptions& options, const std::vector<Row>& rows)
     std::ranges::reverse(files);  // the row goes last: it says whose the others are
     for (const fs::path& file : files) fs::remove(file);
   }
+}
+
+void warn_of_other_runs(const CompareOptions& options, const std::vector<Row>& rows) {
+  std::vector<std::string> others;
+  for (const fs::directory_entry& entry : fs::directory_iterator(options.folder)) {
+    const std::string name = run_of_state(entry.path());
+    const auto has_name = [&](const Row& row) { return row.volume.stem() == name; };
+    if (!name.empty() && std::ranges::none_of(rows, has_name)) others.push_back(name);
+  }
+  if (others.empty()) return;
+  std::ranges::sort(others);
+  base::log_warning(
+      fmt::format("'{}' also has what an older comparison made: {}. These files stay, and the new "
+                  "report has nothing of them",
+                  options.folder.string(), fmt::join(others, ", ")));
 }
 
 }  // namespace tomofield::compare

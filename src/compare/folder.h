@@ -22,4 +22,7 @@ void check_planned_files(const CompareOptions& options, const std::vector<Row>& 
 /// volumes, even if the comparison stops before it is finished.
 void remove_results(const CompareOptions& options, const std::vector<Row>& rows);
 
+/// Warns of runs in the folder that an older comparison made and this one does not: they stay.
+void warn_of_other_runs(const CompareOptions& options, const std::vector<Row>& rows);
+
 }  // namespace tomofield::compare

@@ -17,7 +17,9 @@ namespace fs = std::filesystem;
 // Returns the files of the run, and those in which the comparison keeps its state and all that it
 // said.
 output::OutputPaths paths_of(const Row& row) { return output::output_paths(row.volume); }
-fs::path state_of(const Row& row) { return fs::path(row.volume).replace_extension(".row.json"); }
+constexpr const char* kState = ".row.json";
+
+fs::path state_of(const Row& row) { return fs::path(row.volume).replace_extension(kState); }
 fs::path log_of(const Row& row) { return fs::path(row.volume).replace_extension(".log"); }
 
 // Returns true if there is a checkpoint, or trials of a tuning that was stopped.
@@ -95,6 +97,12 @@ void claim_rows(std::vector<Row>& rows) {
     row.state = {.progress = Progress::kStopped, .costs = {}};
     write_row(state_of(row), row.origin, row.state);
   }
+}
+
+std::string run_of_state(const fs::path& file) {
+  const std::string name = file.filename().string();
+  return name.ends_with(kState) ? name.substr(0, name.size() - std::string_view(kState).size())
+                                : "";
 }
 
 bool is_done(const Row& row) {

@@ -46,6 +46,9 @@ std::vector<Row> new_rows(const std::vector<Run>& runs, const std::filesystem::p
 /// whichever of their runs begin before it is stopped.
 void claim_rows(std::vector<Row>& rows);
 
+/// Returns the name of the run whose state a file holds; empty for other files.
+std::string run_of_state(const std::filesystem::path& file);
+
 /// Returns true if the row is finished and its files exist.
 bool is_done(const Row& row);
 

@@ -194,9 +194,9 @@ VolumeScore score_volume(const VolumeScoreOptions& options) {
   SpecimenOptions specimen = options.specimen;
   specimen.thickness = static_cast<double>(volume.shape.nz) * series.bin_factor();
   const measurement::Measurement plan = measurement::plan_measurement(series, specimen);
-  require_one_voxel_size(fmt::format("'{}'", options.volume.string()), volume.voxel_size_A,
-                         fmt::format("the series '{}'", options.input.stack.string()),
-                         plan.pixel_size_A);
+  common_voxel_size_A(fmt::format("'{}'", options.volume.string()), volume.voxel_size_A,
+                      fmt::format("the series '{}'", options.input.stack.string()),
+                      plan.pixel_size_A);
   check_volume(volume, plan, options.volume);
   require_place(options.volume, plan);
   measurement::Measurement prepared =

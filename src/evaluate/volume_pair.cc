@@ -126,9 +126,11 @@ void check_sizes(const io::MrcReader& first, const io::MrcReader& second) {
     throw mismatch(
         "less than half of one is in the other, and their ORIGINs do not say that one is a part "
         "of the other; are they of the same specimen and scale?");
+  const bool have_places = first.header().origin_A != second.header().origin_A;
   base::log_warning(
-      fmt::format("'{}' has {} voxels and '{}' {}: the common centred box is compared",
-                  first.path().string(), to_text(a), second.path().string(), to_text(b)));
+      fmt::format("'{}' has {} voxels and '{}' {}: the common centred box is compared{}",
+                  first.path().string(), to_text(a), second.path().string(), to_text(b),
+                  have_places ? ", because their ORIGINs make none a part of the other" : ""));
 }
 
 void check_box(const base::Box& box, const base::Box& common, const io::MrcReader& second) {
@@ -146,24 +148,19 @@ bool voxel_sizes_differ(double first_A, double second_A, double tolerance) {
          std::abs(first_A - second_A) > tolerance * second_A;
 }
 
-void require_one_voxel_size(const std::string& first, double first_A, const std::string& second,
-                            double second_A) {
+double common_voxel_size_A(const std::string& first, double first_A, const std::string& second,
+                           double second_A) {
   if (voxel_sizes_differ(first_A, second_A, kMaxScaleDifference))
     throw Error(fmt::format(
         "{} has voxels of {:.4g} Å and {} of {:.4g} Å: bring them to one voxel size first", first,
         first_A, second, second_A));
-}
-
-double common_voxel_size_A(const std::string& first, double first_A, const std::string& second,
-                           double second_A) {
-  require_one_voxel_size(first, first_A, second, second_A);
   const bool is_known = io::is_known_size(second_A) || !io::is_known_size(first_A);
   const double common_A = is_known ? second_A : first_A;
   if (std::abs(first_A - second_A) > 1e-4 * std::abs(second_A))
     base::log_warning(fmt::format(
-        "the voxel sizes differ ({:.6g} Å and {:.6g} Å): compared voxel by voxel all the same, "
-        "with voxels of {:.6g} Å",
-        first_A, second_A, common_A));
+        "the voxel sizes differ, {} has {:.6g} Å and {} {:.6g} Å: compared voxel by voxel all the "
+        "same, with voxels of {:.6g} Å",
+        first, first_A, second, second_A, common_A));
   return common_A;
 }
 

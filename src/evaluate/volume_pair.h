@@ -17,14 +17,11 @@ using VolumeSizes = std::array<std::int64_t, 3>;
 /// Returns true if both voxel sizes (Å) are known and differ by more than `tolerance` times the
 /// second.
 bool voxel_sizes_differ(double first_A, double second_A, double tolerance);
-/// Throws Error, with the names of two volumes, if their voxel sizes (Å) are known and differ so
-/// much that their voxels cannot be compared one by one.
-void require_one_voxel_size(const std::string& first, double first_A, const std::string& second,
-                            double second_A);
 constexpr double kMaxScaleDifference = 0.05;  ///< for read_pair()
 
 /// Returns the voxel size (Å) of two volumes that are compared voxel by voxel: the known one, or 0.
-/// Warns if they differ, and throws Error as require_one_voxel_size() does.
+/// Warns if they differ, with the names of both, and throws Error if both are known and differ by
+/// more than kMaxScaleDifference.
 double common_voxel_size_A(const std::string& first, double first_A, const std::string& second,
                            double second_A);
 

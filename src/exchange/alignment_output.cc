@@ -40,7 +40,7 @@ void write_alignment_results(const tilt_series::PlannedSeries& series,
   output::write_alignment_files(
       series, {header.nx, header.ny, header.nz},
       output::alignment_files(output::output_paths(options.run.output).alignment_prefix),
-      options.specimen.axis_x);
+      output::tilt_axis(series, options.specimen).from_middle_px);
   report::write_alignment_picture(report::alignment_curves(*options.alignment),
                                   output::output_paths(options.run.output).alignment_picture);
   write_relion_alignment(series, options);

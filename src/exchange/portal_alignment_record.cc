@@ -1,8 +1,12 @@
 #include "exchange/portal_alignment_record.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
 #include <utility>
 
+#include "base/log.h"
 #include "io/images/mrc.h"
 #include "io/json.h"
 #include "output/alignment_files.h"
@@ -41,12 +45,11 @@ Place place_of(const io::MrcHeader& header, VolumeAxes axes, double thickness_A)
 
 // Offsets count from the tilt axis, as that of the volume does.
 json section_json(const tilt_series::PlannedSeries& series, std::size_t index,
-                  const SpecimenOptions& specimen) {
+                  const SpecimenOptions& specimen, double axis_from_middle_px) {
   const tilt_series::View& view = series.views()[index];
-  const geometry::RawFromAligned m =
-      series.raw_from_aligned(index)
-          .binned(1.0 / series.bin_factor())
-          .counted_from(output::axis_from_middle_px(series, specimen.axis_x));
+  const geometry::RawFromAligned m = series.raw_from_aligned(index)
+                                         .binned(1.0 / series.bin_factor())
+                                         .counted_from(axis_from_middle_px);
   return {{"z_index", view.section},
           {"tilt_angle", specimen.hand * view.tilt_deg},
           {"volume_x_rotation", specimen.hand * view.x_tilt_deg},
@@ -55,36 +58,49 @@ json section_json(const tilt_series::PlannedSeries& series, std::size_t index,
           {"y_offset", m.shift_y_px}};
 }
 
+bool has_local_motion(const tilt_series::PlannedSeries& series) {
+  const auto is_local = [](const tilt_series::PlannedView& view) { return view.local.has_value(); };
+  return std::ranges::any_of(series.plan().views, is_local);
+}
+
 }  // namespace
 
 void write_portal_alignment(const tilt_series::PlannedSeries& series,
                             const options::ReconstructOptions& options, const fs::path& volume) {
   const SpecimenOptions& specimen = options.specimen;
   const double pixel_A = series.pixel_size_A() / series.bin_factor();
+  const output::TiltAxis axis = output::tilt_axis(series, specimen);
   const Place place =
-      place_of(io::MrcReader(volume).header(), options.volume.axes, specimen.thickness * pixel_A);
-  const double axis_z_px = specimen.axis_z.value_or(specimen.thickness / 2) + specimen.shift_z;
+      place_of(io::MrcReader(volume).header(), options.volume.axes, axis.thickness_px * pixel_A);
   const std::array<double, 3> middle_of_series_A{
-      specimen.axis_x ? *specimen.axis_x * pixel_A
-                      : static_cast<double>(series.aligned_width()) / 2 * series.pixel_size_A(),
+      static_cast<double>(series.aligned_width()) / 2 * series.pixel_size_A() +
+          axis.from_middle_px * pixel_A,
       static_cast<double>(series.aligned_height()) / 2 * series.pixel_size_A(),
-      axis_z_px * pixel_A};
+      axis.height_px * pixel_A};
   std::array<double, 3> offset_A{};
   for (std::size_t a = 0; a < 3; ++a) offset_A[a] = place.middle_A[a] - middle_of_series_A[a];
+  const fs::path path = output::output_paths(options.run.output).portal_alignment;
+  const bool is_local = has_local_motion(series);
+  if (is_local) {
+    base::log_warning(fmt::format(
+        "'{}' has no place for local alignments, which this tomogram has: its shifts are those "
+        "without them",
+        path.string()));
+  }
   json sections = json::array();
   for (std::size_t i = 0; i < series.views().size(); ++i)
-    sections.push_back(section_json(series, i, specimen));
+    sections.push_back(section_json(series, i, specimen, axis.from_middle_px));
   const json record{
-      {"alignment_type", "GLOBAL"},
+      {"alignment_type", is_local ? "LOCAL" : "GLOBAL"},
       {"format", "TOMOFIELD"},
-      {"is_portal_standard", true},
+      {"is_portal_standard", !is_local},
       {"affine_transformation_matrix", {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}},
       {"tilt_offset", 0},
       {"x_rotation_offset", 0},
       {"volume_offset", vector_json(offset_A)},
       {"volume_dimension", vector_json(place.size_A)},
       {"per_section_alignment_parameters", sections}};
-  io::write_json(output::output_paths(options.run.output).portal_alignment, record);
+  io::write_json(path, record);
 }
 
 }  // namespace tomofield::exchange

@@ -44,7 +44,7 @@ void write_relion_alignment(const tilt_series::PlannedSeries& series,
   if (!path) return;
   const io::ViewTable listed = io::read_relion_views(options.files.stack);
   const double pixel_size_A = series.pixel_size_A() / series.bin_factor();
-  const double axis_px = output::axis_from_middle_px(series, options.specimen.axis_x);
+  const double axis_px = output::tilt_axis(series, options.specimen).from_middle_px;
   std::vector<std::size_t> sections;
   for (const tilt_series::View& view : series.views())
     sections.push_back(static_cast<std::size_t>(view.section));

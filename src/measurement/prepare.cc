@@ -302,7 +302,9 @@ Measurement plan_measurement(const tilt_series::PlannedSeries& series,
   plan.geometry = geometry::centred_geometry(series.aligned_width(), series.aligned_height(),
                                              thickness, std::move(tilts));
   plan.geometry.hand = specimen.hand;
-  if (specimen.axis_x) plan.geometry.axis_x = *specimen.axis_x / plan.bin_factor;
+  if (specimen.axis_x)  // binning keeps the middle of a view, and may cut its edges
+    plan.geometry.axis_x +=
+        (*specimen.axis_x - static_cast<double>(series.plan().aligned_width) / 2) / plan.bin_factor;
   if (specimen.axis_z) plan.geometry.axis_z = *specimen.axis_z / plan.bin_factor;
   plan.geometry.axis_z += specimen.shift_z / plan.bin_factor;
   plan.roi = specimen.roi ? scaled_roi(*specimen.roi, plan.bin_factor)
@@ -388,15 +390,6 @@ void realign(const tilt_series::TiltSeries& recorded,
                 processes);
   measurement.rays_bin = bin;
   measurement.geometry.tilt_deg = corrected_tilts(recorded, corrections);
-}
-
-void require_pixels(std::int64_t width, std::int64_t height) {
-  constexpr std::int64_t kFewest = 8;
-  if (std::min(width, height) >= kFewest) return;
-  throw Error(
-      fmt::format("views of {} × {} pixels show nothing: they need at least {} along both sides, "
-                  "after --bin; give a smaller --bin, or check the size in the stack's header",
-                  width, height, kFewest));
 }
 
 }  // namespace tomofield::measurement

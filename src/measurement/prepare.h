@@ -67,7 +67,4 @@ void realign(const tilt_series::TiltSeries& recorded,
              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
              const distributed::Communicator& processes, Measurement& measurement);
 
-/// Throws Error for views in which nothing can be seen: with fewer than 8 pixels along a side.
-void require_pixels(std::int64_t width, std::int64_t height);
-
 }  // namespace tomofield::measurement

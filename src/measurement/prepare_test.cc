@@ -161,6 +161,17 @@ TEST(PrepareSeries, BinnedViewsHaveABinnedGeometry) {
   EXPECT_NEAR(prepared.pixel_size_A, 5.0, 1e-6);
 }
 
+TEST(PrepareSeries, TheTiltAxisCountsInTheViewsBeforeBinningCutsTheirEdges) {
+  SeriesFiles files;
+  SpecimenOptions options = specimen();
+  options.axis_x = 15.0;
+  files.options().bin = 3;  // half a pixel is cut at either edge of 40
+  const tilt_series::PlannedSeries series(files.options());
+  ASSERT_EQ(series.aligned_width(), 13);
+  const geometry::TiltGeometry g = plan_measurement(series, options).geometry;
+  EXPECT_NEAR(3 * (g.axis_x - 13.0 / 2), 15.0 - kWidth / 2.0, 1e-9);
+}
+
 TEST(PrepareSeries, OptionsThatDoNotFitTheSeriesAreRefused) {
   SeriesFiles files;
   const auto complaint = [&](const SpecimenOptions& options) {

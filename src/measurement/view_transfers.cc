@@ -286,12 +286,13 @@ void require_rings(const tilt_series::PlannedSeries& series, const tilt_series::
   const double spread_px = microscope::spread_px(transfer);
   const auto side = static_cast<double>(std::max(series.width(), series.height()));
   if (spread_px <= side) return;
-  throw Error(
-      fmt::format("the defocus of {:.4g} µm of section {} and the spherical aberration of {:g} mm "
-                  "spread detail over {:.3g} of its pixels of {:.4g} Å, and the view has {}: check "
-                  "the defocus, --cs and the pixel size, or give --ctf none",
-                  largest_A * 1e-4, view.section + 1, transfer.optics.spherical_aberration_mm,
-                  spread_px, transfer.pixel_size_A, side));
+  throw Error(fmt::format(
+      "the defocus of {:.4g} µm of section {} and the spherical aberration of {:g} mm "
+      "spread detail over {:.3g} of its pixels of {:.4g} Å, and the view has {}: check "
+      "the defocus, --cs and the pixel size, or correct no contrast transfer (--ctf none, "
+      "without --defocus)",
+      largest_A * 1e-4, view.section + 1, transfer.optics.spherical_aberration_mm, spread_px,
+      transfer.pixel_size_A, side));
 }
 
 // Warns of corrections that a stack has had, as its labels say, and that are applied all the same.

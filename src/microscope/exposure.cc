@@ -199,7 +199,7 @@ StatedExposures exposures_of(const io::Mdoc& mdoc) {
   if (has_some_prior && !no_prior.empty() && has_dose(mdoc, &io::MdocSection::prior_dose))
     return {std::nullopt, fmt::format("PriorRecordDose is missing in {}", names_of(no_prior))};
   if (has_dose(mdoc, &io::MdocSection::dose))
-    return {std::nullopt, fmt::format("ExposureDose is missing in {}", names_of(no_dose))};
+    return {std::nullopt, fmt::format("ExposureDose is missing or 0 in {}", names_of(no_dose))};
   for (const io::MdocSection& section : mdoc.sections)
     if (section.frame_doses_line > 0)
       return {std::nullopt, fmt::format("line {} states doses of frames (FrameDosesAndNumber), and "

@@ -169,9 +169,9 @@ TEST(ExposuresOfMdoc, AreNotThoseOfFrames) {
 TEST(ExposuresOfMdoc, SaysWhatIsMissing) {
   const std::string dose = "ExposureDose = 3";
   EXPECT_EQ(without_times({dose, "ExposureDose = 0", dose}).fault,
-            "ExposureDose is missing in section 2");
+            "ExposureDose is missing or 0 in section 2");
   EXPECT_EQ(without_times({dose, "", "", "", "", "", "", "", "", ""}).fault,
-            "ExposureDose is missing in sections 2, 3, 4, 5, 6, 7, 8, 9 …");
+            "ExposureDose is missing or 0 in sections 2, 3, 4, 5, 6, 7, 8, 9 …");
   EXPECT_EQ(without_times({"PriorRecordDose = 3", "", "PriorRecordDose = 0"}).fault,
             "PriorRecordDose is missing in section 2");
   EXPECT_EQ(without_times({"", ""}).fault, "");

@@ -11,6 +11,7 @@
 #include "geometry/raw_from_aligned.h"
 #include "io/saving/output_set.h"
 #include "io/tables/write_alignment.h"
+#include "measurement/prepare.h"
 
 namespace tomofield::output {
 
@@ -149,21 +150,23 @@ AlignmentFiles alignment_files(const fs::path& prefix) {
   return {with(".xf"), with(".tlt"), with(".xtilt"), with(".aln")};
 }
 
-double axis_from_middle_px(const PlannedSeries& series, std::optional<double> axis_x) {
-  const double middle = static_cast<double>(series.aligned_width()) / 2 * series.bin_factor();
-  return axis_x ? *axis_x - middle : 0.0;
+TiltAxis tilt_axis(const PlannedSeries& series, const SpecimenOptions& specimen) {
+  const geometry::TiltGeometry axis = measurement::plan_measurement(series, specimen).geometry;
+  const double bin = series.bin_factor();
+  return {.from_middle_px = bin * (axis.axis_x - static_cast<double>(axis.width) / 2),
+          .height_px = bin * axis.axis_z,
+          .thickness_px = bin * axis.thickness};
 }
 
 void write_alignment_files(const PlannedSeries& series, const std::array<std::int64_t, 3>& raw_size,
-                           const AlignmentFiles& files, std::optional<double> axis_x) {
-  const double axis_px = axis_from_middle_px(series, axis_x);
+                           const AlignmentFiles& files, double axis_from_middle_px) {
   const std::vector<View>& views = series.views();
   TOMOFIELD_CHECK(views.back().section < raw_size[2], "a view is of no section of the stack");
   std::vector<RawFromAligned> maps(static_cast<std::size_t>(raw_size[2]),
                                    rotation(mean_rotation_rad(series)));
   for (std::size_t view = 0; view < views.size(); ++view)
     maps[static_cast<std::size_t>(views[view].section)] =
-        unbinned_map(series, view).counted_from(axis_px);
+        unbinned_map(series, view).counted_from(axis_from_middle_px);
   write_imod_files(views, maps, files);
   if (has_mirrored_views(series)) {
     base::log_warning(fmt::format("'{}' is not written: AreTomo's format has no mirrored views",

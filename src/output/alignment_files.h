@@ -3,10 +3,10 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <vector>
 
 #include "tilt_series/planned_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::output {
 
@@ -20,9 +20,15 @@ struct AlignmentFiles {
 /// Returns the names PREFIX.xf, PREFIX.tlt, PREFIX.xtilt and PREFIX.aln.
 AlignmentFiles alignment_files(const std::filesystem::path& prefix);
 
-/// Returns how far the tilt axis lies to the right of the middle of the aligned views, in pixels
-/// before binning. `axis_x` is that of SpecimenOptions; none: it lies in the middle.
-double axis_from_middle_px(const tilt_series::PlannedSeries& series, std::optional<double> axis_x);
+/// Where the tilt axis is, in pixels before binning.
+struct TiltAxis {
+  double from_middle_px;  ///< to the right of the middle of the aligned views
+  double height_px;       ///< above the lower face of the field
+  double thickness_px;    ///< of the field: that of SpecimenOptions in whole binned pixels
+};
+
+/// Returns the tilt axis of a fit to this series.
+TiltAxis tilt_axis(const tilt_series::PlannedSeries& series, const SpecimenOptions& specimen);
 
 /// Writes how a series is aligned, as IMOD and AreTomo have it (docs/geometry.md). `raw_size` are
 /// the width and the height of the recorded views before binning, in pixels, and the number of
@@ -41,9 +47,9 @@ double axis_from_middle_px(const tilt_series::PlannedSeries& series, std::option
 ///   There is no .aln of mirrored views, and a warning says so.
 ///
 /// The angles include --tilt-offset and --x-axis-tilt, and the shifts the place of the tilt axis
-/// (`axis_x`, SpecimenOptions), so that it is in the middle: these are not to be applied again.
+/// (TiltAxis), so that it is in the middle: these are not to be applied again.
 void write_alignment_files(const tilt_series::PlannedSeries& series,
                            const std::array<std::int64_t, 3>& raw_size, const AlignmentFiles& files,
-                           std::optional<double> axis_x = {});
+                           double axis_from_middle_px = 0.0);
 
 }  // namespace tomofield::output

@@ -163,13 +163,35 @@ TEST(AlignmentFiles, HaveTheNumbersWorkedByHand) {
     EXPECT_EQ((std::array{row.rotation_deg, row.magnification}), (std::array{90.0, 1.0}));
     EXPECT_EQ((std::array{row.shift_x_px, row.shift_y_px}), (std::array{4.0, 6.0}));
   }
-  // An axis 3 px to the right of the middle of the aligned views, which are 28 px wide, moves the
-  // raw place by M (3, 0) = (0, 3).
-  write_alignment_files(series, kRawSize, files, 17.0);
+  // An axis 3 px to the right of the middle of the aligned views moves the raw place by
+  // M (3, 0) = (0, 3).
+  write_alignment_files(series, kRawSize, files, 3.0);
   for (const io::ImodTransform& t : io::read_imod_transforms(files.xf))
     EXPECT_EQ((std::array{t.shift_x_px, t.shift_y_px}), (std::array{-9.0, 4.0}));
   for (const io::AreTomoRow& row : io::read_aretomo_alignment(files.aln, true).rows)
     EXPECT_EQ((std::array{row.shift_x_px, row.shift_y_px}), (std::array{4.0, 9.0}));
+}
+
+TEST(AlignmentFiles, KnowWhereTheAxisIsInAnyBin) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = six_sections(scratch);
+  SpecimenOptions specimen;
+  specimen.thickness = 15;
+  for (const int bin : {1, 2, 3}) {
+    options.bin = bin;
+    const PlannedSeries series(options);
+    const TiltAxis middle = tilt_axis(series, specimen);
+    EXPECT_EQ(middle.from_middle_px, 0.0);
+    EXPECT_EQ(middle.thickness_px, bin == 2 ? 16 : 15);
+    EXPECT_EQ(middle.height_px, middle.thickness_px / 2);
+    SpecimenOptions moved = specimen;
+    moved.axis_x = 23.0;
+    moved.axis_z = 4.0;
+    moved.shift_z = 2.0;
+    const TiltAxis axis = tilt_axis(series, moved);
+    EXPECT_NEAR(axis.from_middle_px, 23.0 - kRawSize[0] / 2.0, 1e-9);
+    EXPECT_NEAR(axis.height_px, 6.0, 1e-9);
+  }
 }
 
 // The tilts are −25°, −15°, 15° and 25° at the sections 1, 2, 5 and 6.

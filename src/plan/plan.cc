@@ -136,7 +136,6 @@ RunPlan plan_run(const tilt_series::PlannedSeries& series, const options::Recons
   run.num_views = plan.geometry.num_views();
   run.view_width = plan.geometry.width;
   run.view_height = plan.geometry.height;
-  measurement::require_pixels(run.view_width, run.view_height);
   run.pixel_size_A = plan.pixel_size_A;
   run.roi = plan.roi;
   run.thickness = plan.geometry.thickness;

@@ -34,8 +34,8 @@ void log_local_motion(const alignment::LocalRecord& local) {
   const std::string errors = describe_errors(local.trial.held_out);
   if (local.trial.is_accepted) {
     base::log_info(fmt::format(
-        "undone: local motion of {:.2f} pixels (root mean square), which .xf and .aln files cannot "
-        "hold; {}",
+        "undone: local motion of {:.2f} pixels (root mean square), which the files for other "
+        "programs do not hold; {}",
         local.rms_px, errors));
   } else {
     base::log_info(

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <utility>
 
@@ -40,6 +42,17 @@ void check_companions(const TiltSeriesOptions& options, const io::ImageStack& st
   HalfStacks({*options.even, *options.odd}, stack);
 }
 
+// Refuses views in which nothing can be seen.
+void require_pixels(const PlannedSeries& series) {
+  constexpr std::int64_t kFewest = 8;
+  const std::int64_t width = series.aligned_width(), height = series.aligned_height();
+  if (std::min(width, height) >= kFewest) return;
+  throw Error(
+      fmt::format("views of {} × {} pixels show nothing: they need at least {} along both sides, "
+                  "after --bin; give a smaller --bin, or check the size in the stack's header",
+                  width, height, kFewest));
+}
+
 }  // namespace
 
 std::shared_ptr<const io::ImageStack> open_views(const TiltSeriesOptions& options) {
@@ -68,6 +81,7 @@ PlannedSeries::PlannedSeries(const TiltSeriesOptions& options,
     for (const PlannedView& planned : series.plan.views) series.views.push_back(planned.view);
     series.messages = log.take();
     impl_ = std::make_shared<const Impl>(std::move(series));
+    require_pixels(*this);
   });
 }
 

@@ -27,8 +27,8 @@ std::shared_ptr<const io::ImageStack> open_views(const TiltSeriesOptions& option
 /// (measured_series.h). Copies share one plan.
 class PlannedSeries {
  public:
-  /// Opens the files, and checks counts, angles and sizes. Throws Error that names the file.
-  /// Processes of a job share an error.
+  /// Opens the files, and checks counts, angles and sizes. Throws Error that names the file, or for
+  /// views with fewer than 8 pixels along a side after binning. Processes of a job share an error.
   explicit PlannedSeries(
       const TiltSeriesOptions& options,
       const distributed::Communicator& processes = distributed::Communicator::alone());

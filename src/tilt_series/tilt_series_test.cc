@@ -149,13 +149,14 @@ TEST(TiltSeries, OptionsThatExcludeEachOther) {
 TEST(TiltSeries, BinningKeepsExactPixelSizes) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = small_series(scratch);
+  write_stack(options.stack, 24, 20, 3, some_value);
   options.pixel_size_A = 1.7;
   options.angpix = 4.0;
   const TiltSeries series(options);
   EXPECT_DOUBLE_EQ(series.bin_factor(), 4.0 / 1.7);
   EXPECT_DOUBLE_EQ(series.pixel_size_A(), 4.0);
-  EXPECT_EQ(series.width(), 6);   // floor(16 / 2.353)
-  EXPECT_EQ(series.height(), 5);  // floor(12 / 2.353)
+  EXPECT_EQ(series.width(), 10);  // floor(24 / 2.353)
+  EXPECT_EQ(series.height(), 8);  // floor(20 / 2.353)
   options.angpix.reset();
   options.bin = 2;
   const TiltSeries halved(options);
@@ -165,16 +166,32 @@ TEST(TiltSeries, BinningKeepsExactPixelSizes) {
   EXPECT_FLOAT_EQ(load(halved, 0).image[1], mean);
 }
 
+TEST(TiltSeries, ViewsOfFewerThanEightPixelsAreRefused) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  for (const auto& [width, height] : {std::pair{32, 1}, {1, 32}, {7, 7}, {2, 2}}) {
+    write_stack(options.stack, width, height, 3, some_value);
+    expect_parts(testing::message_of<Error>([&] { PlannedSeries{options}; }),
+                 {fmt::format("views of {} × {} pixels", width, height), "at least 8", "--bin"});
+  }
+  write_stack(options.stack, 16, 16, 3, some_value);
+  options.bin = 2;
+  EXPECT_EQ(PlannedSeries(options).aligned_width(), 8);
+  options.bin = 16;  // a single pixel cannot differ from the others
+  expect_parts(refusal(options), {"views of 1 × 1 pixels"});
+}
+
 TEST(TiltSeries, ASizeThatAHeaderHasRoundedIsTheSame) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = small_series(scratch);
+  write_stack(options.stack, 24, 16, 3, some_value);
   for (const double stored_A : {1.34, 3.37}) {
     options.pixel_size_A = static_cast<double>(static_cast<float>(stored_A * 48) / 48.0f);
     for (const int bin : {1, 2}) {
       options.angpix = bin * stored_A;
       const TiltSeries series(options);
       EXPECT_EQ(series.bin_factor(), bin);
-      EXPECT_EQ(series.width(), 16 / bin);
+      EXPECT_EQ(series.width(), 24 / bin);
     }
   }
 }

@@ -197,7 +197,9 @@ TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings&
   TrialSettings corrected = chosen;
   corrected.fits_view_scale =
       trials.first_as_good({unscaled, chosen}, kClearErrors).fits_view_scale;
-  corrected.masks_beads = trials.first_as_good({chosen, unmasked}, kClearErrors).masks_beads;
+  if (open.beads)
+    corrected.masks_beads =
+        is_surely_better(trials.trial(chosen).score, trials.trial(unmasked).score);
   return corrected;
 }
 

@@ -261,6 +261,15 @@ def test_overwrite_leaves_nothing_old(compare):
     assert "sirt: running" in said and "ours: running" in said, said
 
 
+def test_overwrite_names_the_runs_that_it_leaves(series):
+    folder = harness.fresh_directory("fewer")
+    command = ["compare", series.stack, "--tlt", series.tlt, *QUICK, "-o", folder, "--methods"]
+    harness.succeed(*command, "wbp,sirt", "--hold-out", 4)
+    said = harness.succeed(*command, "wbp", "--overwrite").stderr
+    assert "also has what an older comparison made: sirt, sirt.held_out, wbp.held_out." in said, said
+    assert os.path.exists(os.path.join(folder, "sirt.mrc"))
+
+
 def test_what_a_row_was_made_from_is_watched(series):
     folder, files = harness.fresh_directory("changed"), harness.fresh_directory("changed_files")
     tlt, config = os.path.join(files, "copy.tlt"), os.path.join(files, "sirt.toml")

@@ -252,6 +252,9 @@ def test_origins_say_where_a_part_lies():
     # A nonsensical ORIGIN is ignored.
     found, _ = evaluate(save("corner.mrc", corner, origin=(3, 4, 1e30)), whole)
     assert found["box_first"] == [0, 10, 0], found
+    # ORIGINs that make neither a part of the other are set aside, which is said.
+    found, result = evaluate(save("corner.mrc", corner, origin=(-20, 30, 0)), whole)
+    assert found["box_first"] == [0, 10, 0] and "their ORIGINs make none a part" in result.stderr, result
 
 
 def test_particles_of_other_programs_are_no_positions_of_simulate():
@@ -467,6 +470,8 @@ def test_fsc_under_a_mask_and_in_a_box():
                              (save("m3.mrc", 0 * mask), "not all be 0")):
         result = run(*files, "--fsc-mask", mask_file)
         assert result.returncode == 2 and words in result.stderr, result
+    _, said = evaluate(*files, "--fsc-mask", save("m6.mrc", mask, voxel_size=10.3))
+    assert "the voxel sizes differ, the mask" in said.stderr and "10.3 Å" in said.stderr, said.stderr
 
 
 def test_fsc_table_and_picture():
@@ -613,6 +618,9 @@ def test_reprojection_error():
     wide = save("wide.mrc", volume, voxel_size=2 * float(mrcfile.open(truth, header_only=True).voxel_size.x))
     refused = run(wide, *series, "--no-margin")
     assert refused.returncode == 2 and "bring them to one voxel size" in refused.stderr, refused
+    near = save("near.mrc", volume, voxel_size=10.3)
+    _, said = evaluate(near, *series, "--no-margin")
+    assert "has 10.3 Å and the series" in said.stderr, said.stderr
     elsewhere = save("elsewhere.mrc", volume, float(mrcfile.open(truth, header_only=True).voxel_size.x),
                      label="tomofield 1", origin=(80, 0, 0))
     refused = run(elsewhere, *series, "--no-margin")

@@ -1,6 +1,7 @@
 """Tests that the local alignments of other programs are applied. Beads are projected by the other
 program's formula, written down here from its source, and must be reconstructed in their places."""
 
+import json
 import os
 import pathlib
 import re
@@ -222,14 +223,23 @@ def write_aln(folder, with_patches=True):
     return write(folder, "TS_01.aln", text)
 
 
+def described_for_portal(folder):
+    with open(os.path.join(folder, "out_alignment.json"), encoding="utf-8") as file:
+        alignment = json.load(file)
+    return alignment["alignment_type"], alignment["is_portal_standard"]
+
+
 def test_patch_shifts_of_aretomo_are_applied():
     folder = fresh_directory("aretomo")
     write_views(folder, aretomo_place)
-    arguments = ["TS_01.st", "--aln", "TS_01.aln", "--thickness", THICKNESS]
+    arguments = ["TS_01.st", "--aln", "TS_01.aln", "--thickness", THICKNESS, "--alignment-json"]
     write_aln(folder, with_patches=False)
-    without, _ = distances(folder, *arguments)
+    without, printed = distances(folder, *arguments)
+    assert described_for_portal(folder) == ("GLOBAL", True) and "local" not in printed.stderr
     write_aln(folder)
     found, printed = distances(folder, *arguments)
+    assert described_for_portal(folder) == ("LOCAL", False)
+    assert "out_alignment.json' has no place for local alignments" in printed.stderr, printed.stderr
     assert found.max() < 0.6 and found.mean() < 0.5 * without.mean(), (found, without)
     assert f"local alignment of 'TS_01.aln' in {len(TILTS)} views" in printed.stderr, printed.stderr
 

@@ -169,6 +169,15 @@ def test_sizes_for_relion_are_unbinned(relion, finished):
     assert "no STAR file" in result.stderr, result.stderr
 
 
+@pytest.mark.parametrize("options", [["--bin", 2], ["--bin", 4], ["--bin", 2, "--axes", "xzy"],
+                                     ["--bin", 2, "--shift-z", 4], ["--angpix", 1.7 * PIXEL_SIZE]])
+def test_the_axis_is_in_the_middle_of_the_volume_at_any_bin(relion, options):
+    _, output = relion.run("--series", "TS_01", "--thickness", 33, "--alignment-json", *options)
+    with open(output[:-4] + "_alignment.json", encoding="utf-8") as file:
+        offset = json.load(file)["volume_offset"]
+    assert abs(offset["z"] - (-4 * PIXEL_SIZE if "--shift-z" in options else 0)) < 1e-3, offset
+
+
 def test_a_new_alignment_goes_back_to_relion(relion):
     wrong_px = np.random.default_rng(5).normal(0, 1, SHIFTS_PX.shape)
     names = [f"{i + 1:06d}@stacks/TS_02.mrcs" for i in range(len(TILTS))]

@@ -50,8 +50,7 @@ std::string read_config(const std::string& path) {
   try {
     return io::read_text_file(path);
   } catch (const Error& error) {
-    throw Error(
-        fmt::format("--config '{}' cannot be read: check its path ({})", path, error.what()));
+    throw Error(fmt::format("--config '{}' cannot be read: {}", path, error.what()));
   }
 }
 

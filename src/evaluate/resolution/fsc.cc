@@ -227,9 +227,9 @@ base::Volume read_mask(const std::filesystem::path& path, const std::filesystem:
         fmt::format("the mask '{}' lies elsewhere than '{}' (ORIGIN): give one of its place",
                     path.string(), second.string()));
   base::Volume weights = read_box(mask, box);
-  require_one_voxel_size(fmt::format("the mask '{}'", path.string()), weights.voxel_size_A,
-                         fmt::format("'{}'", second.string()),
-                         io::cubic_voxel_size_A(volume.header(), second));
+  common_voxel_size_A(fmt::format("the mask '{}'", path.string()), weights.voxel_size_A,
+                      fmt::format("'{}'", second.string()),
+                      io::cubic_voxel_size_A(volume.header(), second));
   require_numbers(weights, path);
   return weights;
 }

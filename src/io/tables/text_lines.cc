@@ -20,8 +20,8 @@ constexpr int kMostLines = 1 << 20;
 
 [[noreturn]] void throw_no_text(const std::filesystem::path& path, std::int64_t bytes) {
   throw Error(fmt::format(
-      "'{}' is no text file of a tilt series ({} bytes): give one of at most {} MiB, without "
-      "zero bytes",
+      "'{}' is no text file that is read here ({} bytes): give one of at most {} MiB, without zero "
+      "bytes",
       path.string(), bytes, kLargestTextFile >> 20));
 }
 

@@ -77,7 +77,6 @@ std::optional<geometry::ViewWarp> FileMotion::of(View& view) {
   ++num_views_;
   squares_px2_ += fitted.rms_px * fitted.rms_px;
   left_over_px2_ += fitted.left_over_px * fitted.left_over_px;
-  largest_px_ = std::max(largest_px_, fitted.warp.largest_component());
   largest_stated_px_ = std::max(largest_stated_px_, fitted.largest_stated_px);
   return fitted.warp;
 }
@@ -87,7 +86,7 @@ void FileMotion::report() const {
   base::log_info(fmt::format(
       "local alignment of '{}' in {} views: {:.2f} px (root mean square), at most {:.1f} px; the "
       "spline through 5 × 5 places leaves out {:.2f} px",
-      source_, num_views_, std::sqrt(squares_px2_ / num_views_), largest_px_,
+      source_, num_views_, std::sqrt(squares_px2_ / num_views_), largest_stated_px_,
       std::sqrt(left_over_px2_ / num_views_)));
   const double largest_A = largest_stated_px_ * pixel_size_A_;
   if (largest_A <= kLargestMotion_A) return;

@@ -40,7 +40,7 @@ class FileMotion {
   double pixel_size_A_, width_px_, height_px_, raw_width_px_, raw_height_px_;
   int num_views_ = 0;
   double squares_px2_ = 0.0, left_over_px2_ = 0.0;
-  double largest_px_ = 0.0, largest_stated_px_ = 0.0;
+  double largest_stated_px_ = 0.0;
 };
 
 }  // namespace tomofield::tilt_series
