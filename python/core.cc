@@ -63,10 +63,12 @@ std::vector<float> values_of(const Array<float>& array) {
   return {array.data(), array.data() + array.size()};
 }
 
-Tomogram to_tomogram(const Array<float>& array, double voxel_size_A) {
+Tomogram to_tomogram(const Array<float>& array, double voxel_size_A,
+                     const std::array<double, 3>& origin_A = {}) {
   require_dimensions(array, 3, "a volume is an array [z, y, x]");
   return {.size = {array.shape(2), array.shape(1), array.shape(0)},
           .voxel_size_A = voxel_size_A,
+          .origin_A = origin_A,
           .values = values_of(array)};
 }
 
@@ -158,10 +160,10 @@ bool align_series(const TiltSeries& series, const option_table::Choices& choices
   });
 }
 
-// Returns a volume in memory as numbers and the size of a voxel.
+// Returns a volume in memory as numbers, the size of a voxel and the place of its corner.
 py::tuple to_tuple(Tomogram tomogram) {
-  return py::make_tuple(to_volume(std::move(tomogram.values), tomogram.size),
-                        tomogram.voxel_size_A);
+  return py::make_tuple(to_volume(std::move(tomogram.values), tomogram.size), tomogram.voxel_size_A,
+                        tomogram.origin_A);
 }
 
 py::dict run(const TiltSeries& series, const option_table::Choices& choices, py::object callback) {
@@ -241,8 +243,9 @@ py::tuple read_volume(const std::filesystem::path& path) {
 }
 
 void write_volume(const Array<float>& volume, double voxel_size_A,
-                  const std::filesystem::path& path, bool overwrite) {
-  const Tomogram tomogram = to_tomogram(volume, voxel_size_A);
+                  const std::array<double, 3>& origin_A, const std::filesystem::path& path,
+                  bool overwrite) {
+  const Tomogram tomogram = to_tomogram(volume, voxel_size_A, origin_A);
   const Unlocked unlocked;
   write_mrc(tomogram, path, overwrite);
 }
@@ -361,7 +364,7 @@ void add_model(py::module_& module) {
   module.def("export_particles", &cut_particles);
   module.def("read_mrc", &read_volume);
   module.def("write_mrc", &write_volume, py::arg("volume").noconvert(), py::arg("voxel_size_A"),
-             py::arg("path"), py::arg("overwrite"));
+             py::arg("origin_A"), py::arg("path"), py::arg("overwrite"));
 }
 
 std::optional<double> resolution_at(const ShellCorrelation& curve, const py::object& threshold) {

@@ -60,12 +60,13 @@ struct CutParticles {
 CutParticles export_particles(const Model& model, const ParticleCuts& cuts, const VolumeFile& file);
 
 /// Reads an MRC file, a volume or a stack of images, as floats with the voxel size along x (0 if
-/// the header has none). Throws Error for a file that cannot be read, and for too little memory.
+/// the header has none) and its ORIGIN. Throws Error for a file that cannot be read, and for too
+/// little memory.
 Tomogram read_mrc(const std::filesystem::path& path);
 
-/// Writes a volume in memory as an MRC file of 32-bit floats with its voxel size. Throws Error for
-/// a voxel size that is none, for values that are not as many as the voxels, and for a file that
-/// cannot be written.
+/// Writes a volume in memory as an MRC file of 32-bit floats with its voxel size and ORIGIN. Throws
+/// Error for a voxel size that is none, an origin that is not finite, values that are not as many
+/// as the voxels, and for a file that cannot be written.
 void write_mrc(const Tomogram& volume, const std::filesystem::path& path, bool overwrite = false);
 
 }  // namespace tomofield

@@ -25,10 +25,12 @@ class Tomogram:
 
     values: array [z, y, x], float32, in the units and the contrast of the tilt series.
     voxel_size_A: side of a voxel in Å, or 0 if nobody knows it.
+    origin_A: x, y, z in Å of its corner in the whole volume, which a file has as ORIGIN.
     """
 
     values: Array
     voxel_size_A: float
+    origin_A: Numbers = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         _require_unmasked(self.values)
@@ -40,6 +42,7 @@ class Tomogram:
         object.__setattr__(self, "values", values)
         size = number_of(self.voxel_size_A, "voxel_size_A")
         object.__setattr__(self, "voxel_size_A", size if size == 0 else _plausible(size))
+        object.__setattr__(self, "origin_A", numbers_of(self.origin_A, 3, number_of, "origin_A"))
 
     def __array__(self, dtype: Optional[npt.DTypeLike] = None) -> npt.NDArray[Any]:
         return np.asanyarray(self.values, dtype=dtype)  # with the mask that somebody may give it
@@ -145,7 +148,9 @@ class Model:
     def tomogram(self, voxel_size_A: Optional[float] = None) -> Tomogram:
         """Return the region of interest as a volume, by default with a voxel a pixel."""
         box = self._region_of(voxel_size_A)
-        return Tomogram(self.sample(box), box.voxel_px * self.pixel_size_A)
+        corner = [centre - side * box.voxel_px / 2 for centre, side in zip(box.centre_px, box.size)]
+        x, y, z = (at * self.pixel_size_A for at in corner)
+        return Tomogram(self.sample(box), box.voxel_px * self.pixel_size_A, (x, y, z))
 
     def _region_of(self, voxel_size_A: Optional[float]) -> Box:
         return self.region(self._voxel_px(voxel_size_A))
@@ -230,7 +235,8 @@ def write_mrc(path: Path, volume: npt.ArrayLike, voxel_size_A: Optional[float] =
     voxel_size_A: side of a voxel in Å, which an array needs and a Tomogram has.
     """
     size, file = _voxel_size(voxel_size_A, volume), path_of(path, "the output")
-    _core.write_mrc(array_of(volume), size, file, switch_of(overwrite, "overwrite"))
+    origin = volume.origin_A if isinstance(volume, Tomogram) else (0.0, 0.0, 0.0)
+    _core.write_mrc(array_of(volume), size, origin, file, switch_of(overwrite, "overwrite"))
 
 
 def _voxel_size(given: Optional[float], *volumes: Any) -> float:

@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
 #include <span>
 #include <vector>
@@ -29,6 +32,10 @@ std::vector<io::OutputLock> claim(const std::filesystem::path& path, bool overwr
     io::check_output_files({path}, {}, overwrite, kAdvice);
     io::require_volume_name(path);
   });
+}
+
+bool is_finite(const std::array<double, 3>& origin_A) {
+  return std::ranges::all_of(origin_A, [](double at_A) { return std::isfinite(at_A); });
 }
 
 exchange::ExportFiles files_of(const Model& model, const VolumeFile& file) {
@@ -83,9 +90,11 @@ Tomogram read_mrc(const std::filesystem::path& path) {
   const std::size_t count = section * static_cast<std::size_t>(header.nz);
   base::require_memory(count * sizeof(float), fmt::format("'{}' in memory", path.string()).c_str(),
                        "export a part of it, or with larger voxels");
-  Tomogram volume{.size = {header.nx, header.ny, header.nz},
-                  .voxel_size_A = io::cubic_voxel_size_A(header, path),
-                  .values = std::vector<float>(count)};
+  Tomogram volume{
+      .size = {header.nx, header.ny, header.nz},
+      .voxel_size_A = io::cubic_voxel_size_A(header, path),
+      .origin_A = is_finite(header.origin_A) ? header.origin_A : std::array<double, 3>{},
+      .values = std::vector<float>(count)};
   io::warn_of_mode(header, path.string());
   for (std::int64_t z = 0; z < header.nz; ++z)
     file.read_section(
@@ -103,12 +112,15 @@ void write_mrc(const Tomogram& volume, const std::filesystem::path& path, bool o
   if (nx < 1 || ny < 1 || nz < 1 || !(base::CheckedSize(nx) * ny * nz).is(volume.values.size()))
     throw Error(fmt::format("{} values are not a volume of {} × {} × {} voxels",
                             volume.values.size(), nx, ny, nz));
+  if (!is_finite(volume.origin_A))
+    throw Error("the origin of a volume is three finite numbers in Å");
   const std::vector<io::OutputLock> locks = claim(path, overwrite);
   io::MrcSpec spec;
   spec.nx = nx;
   spec.ny = ny;
   spec.nz = nz;
   spec.voxel_size_A.fill(volume.voxel_size_A);
+  spec.origin_A = volume.origin_A;
   // A label that began with "tomofield" would say that the file is no tilt series.
   spec.labels = {fmt::format("values in memory, written by tomofield {}", library_version())};
   io::MrcWriter file(path, spec);

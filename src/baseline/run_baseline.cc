@@ -120,11 +120,8 @@ Tomogram tomogram_of(const Solution& solution, const measurement::Measurement& s
                      const BaselineOptions& options) {
   const output::ModelInfo info = output::model_info(series, options.shared.views.contrast);
   const field::OrientedBox box = output::region_box(info, 1.0);
-  Tomogram tomogram{.size = box.size,
-                    .voxel_size_A = info.pixel_size_A,
-                    .values = field::gather_box(box, voxels_of(solution.densities))};
-  output::to_output(info, tomogram.values, options.shared.volume.invert);
-  return tomogram;
+  return output::to_tomogram(info, box, field::gather_box(box, voxels_of(solution.densities)),
+                             options.shared.volume.invert);
 }
 
 void write_volume(const Solution& solution, const measurement::Measurement& series,

@@ -127,7 +127,9 @@ std::vector<Column> read_head(const fs::path& path, const CsvRecord& head,
 }
 
 // Returns whether a flag is given, or nothing if the cell cannot be read.
-std::optional<bool> read_flag(const std::string& cell) {
+std::optional<bool> read_flag(std::string cell) {
+  std::ranges::transform(cell, cell.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (cell == "true" || cell == "yes" || cell == "1") return true;
   if (cell == "false" || cell == "no" || cell == "0") return false;
   return std::nullopt;

@@ -150,11 +150,16 @@ void print_answer(const CLI::App& program, const CLI::ParseError& request) {
   print_text(answer.str());
 }
 
-// Refuses "--option=" without a value. CLI11 would take the next word for it.
+// Refuses "--option=" without a value, for which CLI11 would take the next word, and "-o=NAME", in
+// which it would take the equals sign for a part of the name.
 void require_values(const std::vector<std::string>& arguments) {
-  for (const std::string& word : arguments)
+  for (const std::string& word : arguments) {
     if (word.starts_with("--") && word.find('=') == word.size() - 1)
       throw Error(fmt::format("{} has no value: give one, or leave the option out", word));
+    if (word.starts_with("-o="))
+      throw Error(fmt::format("'{}': -o takes its value after a space: give -o {}", word,
+                              word.size() > 3 ? word.substr(3) : "NAME"));
+  }
 }
 
 // Gives files behind "--" names that no option has: CLI11 takes a "--" after an option of several

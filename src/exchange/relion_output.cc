@@ -45,13 +45,33 @@ std::size_t find_row(const io::RelionTomograms& all, const Setting& origin) {
       origin.file.string(), origin.row, origin.value));
 }
 
+// Says whether the views have places that the table of the project does not state. A table of new
+// places is written after an alignment.
+bool are_views_elsewhere(const options::ReconstructOptions& options) {
+  const SeriesFiles& files = options.files;
+  const bool has_others = files.tlt || files.xf || files.aln || files.xtilt || files.local ||
+                          options.views.tilt_offset_deg != 0 || options.views.x_axis_tilt_deg != 0;
+  return has_others && !relion_alignment(options);
+}
+
+// Says whether the table's size of a pixel is not the one that is used.
+bool are_pixels_others(const options::ReconstructOptions& options) {
+  return std::ranges::any_of(options.settings, [](const Setting& setting) {
+    return setting.option == "--pixel-size" && !setting.instead.empty();
+  });
+}
+
 // Says why RELION could not use the volume, or nothing if it can.
-const char* obstacle(const Options& options) {
+const char* obstacle(const options::ReconstructOptions& options) {
   if (options.volume.axes != VolumeAxes::kXyz) return "its axes are not in the order xyz";
   if (options.specimen.roi) return "it is a part of the specimen (--roi)";
   if (options.specimen.axis_x || options.specimen.axis_z || options.specimen.shift_z != 0)
     return "its middle is not the point about which the series is aligned";
   if (options.specimen.hand != 1) return "it is mirrored in Z (--hand -1)";
+  if (are_pixels_others(options)) return "its pixels are not those of the project (--pixel-size)";
+  if (are_views_elsewhere(options))
+    return "its views have other angles or places than in the project's table (with --align, a "
+           "table of the views as aligned is written)";
   return nullptr;
 }
 

@@ -6,12 +6,14 @@
 #include <cmath>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "base/threads/parallel.h"
 #include "field/sampling/sample_box.h"
 #include "output/sample_model.h"
 #include "output/sampling_time.h"
 #include "output/volume.h"
+#include "output/volume_frame.h"
 #include "tomofield/error.h"
 
 // The public class Model of include/tomofield/model.h.
@@ -72,13 +74,18 @@ void to_output(const ModelInfo& model, std::vector<float>& values, bool invert) 
   for (float& value : values) value = scale * value + 0.0f;  // no −0
 }
 
+Tomogram to_tomogram(const ModelInfo& model, const field::OrientedBox& box,
+                     std::vector<float> values, bool invert) {
+  to_output(model, values, invert);
+  return {.size = box.size,
+          .voxel_size_A = box.voxel_px * model.pixel_size_A,
+          .origin_A = corner_A(model, VolumeFrame(model).from_field(box)),
+          .values = std::move(values)};
+}
+
 Tomogram sample_tomogram(const output::Model& model, bool invert) {
   const field::OrientedBox box = output::region_box(model, 1.0);
-  Tomogram tomogram{.size = box.size,
-                    .voxel_size_A = model.pixel_size_A,
-                    .values = output::sample_box(model, box)};
-  to_output(model, tomogram.values, invert);
-  return tomogram;
+  return to_tomogram(model, box, output::sample_box(model, box), invert);
 }
 
 }  // namespace output

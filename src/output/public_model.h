@@ -30,6 +30,10 @@ namespace output {
 /// Turns densities into values of the input's units and contrast, or of the inverted contrast.
 void to_output(const ModelInfo& model, std::vector<float>& values, bool invert = false);
 
+/// Returns a box of a model in memory, whose densities are `values`.
+Tomogram to_tomogram(const ModelInfo& model, const field::OrientedBox& box,
+                     std::vector<float> values, bool invert);
+
 /// Samples the region of interest at the voxels that write_volume() writes, as floats in the order
 /// z, y, x. `invert` turns their contrast.
 Tomogram sample_tomogram(const Model& model, bool invert);

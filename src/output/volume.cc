@@ -61,8 +61,9 @@ void require_inside(const Model& model, const BoxBounds& box) {
       "xyz"[*axis], box.low[*axis], box.high[*axis], field.low[*axis], field.high[*axis]));
 }
 
-// Returns the corner of a box of the volume from the view's corner in Å (docs/geometry.md).
-std::array<double, 3> origin_A(const ModelInfo& info, const OrientedBox& box, VolumeAxes axes) {
+}  // namespace
+
+std::array<double, 3> corner_A(const ModelInfo& info, const OrientedBox& box, VolumeAxes axes) {
   if (!box.is_aligned()) return {0.0, 0.0, 0.0};
   const auto [nx, ny, nz] = box.size;
   Point corner = box.position({0.0, 0.0, 0.0});
@@ -74,8 +75,6 @@ std::array<double, 3> origin_A(const ModelInfo& info, const OrientedBox& box, Vo
   for (double& value : corner) value *= info.pixel_size_A;
   return corner;
 }
-
-}  // namespace
 
 float largest_density(const VoxelSource& source, const distributed::Communicator& processes) {
   std::mutex mutex;
@@ -263,7 +262,7 @@ void write_voxels(const VoxelSource& source, const OrientedBox& box, const Model
   spec.mode = mrc_mode(options.voxel_type);
   spec.voxel_size_A.fill(box.voxel_px * info.pixel_size_A);
   const OrientedBox in_volume = VolumeFrame(info).from_field(box);
-  spec.origin_A = origin_A(info, in_volume, options.axes);
+  spec.origin_A = corner_A(info, in_volume, options.axes);
   spec.labels = volume_labels(info, made_by);
   if (!in_volume.is_aligned()) spec.labels.emplace_back(io::kLabelOfTurnedBox);
   if (info.x_tilt_deg != 0.0) spec.labels.emplace_back(io::kLabelOfXTilt);

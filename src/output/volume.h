@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -52,6 +53,11 @@ float largest_density(const Model& model);
 /// Returns the region of interest and the whole thickness, in whole voxels of `voxel_px` pixels, as
 /// reconstruct writes it. It lies along the axes of that volume.
 field::OrientedBox tomogram_box(const ModelInfo& model, double voxel_px);
+
+/// Returns the corner of a box of the volume from the view's corner in Å, along the axes of the
+/// file (docs/geometry.md); 0 for one that was turned.
+std::array<double, 3> corner_A(const ModelInfo& info, const field::OrientedBox& box,
+                               VolumeAxes axes = VolumeAxes::kXyz);
 
 /// Returns tomogram_box() where it lies in the field: turned back by the x-axis tilt and brought
 /// level.

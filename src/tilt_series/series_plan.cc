@@ -274,6 +274,15 @@ void require_compatible(const TiltSeriesOptions& options) {
   }
 }
 
+void require_no_axis_beside(const TiltSeriesOptions& options,
+                            const std::optional<SectionTable>& table) {
+  if (!options.tilt_axis_deg || !table || table->is_nominal) return;
+  throw Error(fmt::format(
+      "--tilt-axis turns views that have no other alignment, and '{}' aligns them: leave "
+      "--tilt-axis out",
+      table->source));
+}
+
 std::array<std::int64_t, 2> aligned_size(const InPlaneAlignment& alignment,
                                          const io::MrcHeader& header) {
   if (alignment.swaps_sizes()) return {header.ny, header.nx};
@@ -341,6 +350,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
   SeriesPlan plan;
   plan.pixel_size_A = find_pixel_size(options, stack, mdoc);
   const auto table = find_section_table(options, stack, plan.pixel_size_A);
+  require_no_axis_beside(options, table);
   const TiltAngles angles = find_tilt_angles(options, stack, table, mdoc);
   const std::vector<double> x_tilts_deg = find_x_tilts(options, stack, table);
   const ReplacedTable replaced(options, stack, table, plan.pixel_size_A);

@@ -479,6 +479,7 @@ def test_options_are_named_as_they_are_written(stack):
 def test_an_option_without_its_value_takes_no_other_word(good, out, refuse, stack):
     for option in ("--exclude=", "--thickness=", "--tlt="):
         refuse([f"{option} has no value"], "reconstruct", stack, *good, option, "-o", out)
+    refuse(["give -o x.mrc"], "reconstruct", stack, *good, "-o=x.mrc")
 
 
 def test_volumes_have_no_name_of_another_format(tmp_path):

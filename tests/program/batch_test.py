@@ -299,7 +299,7 @@ def test_a_table_gives_each_series_its_own_options(data):
     table = write_table(os.path.join(folder, "list.csv"), [
         ["stack", "tlt", "name", "thickness", "exclude", "invert", "output"],
         [os.path.join(data, "a.mrc"), os.path.join(data, "a.tlt"), "one, first", "", "1,2", "", ""],
-        [os.path.join(data, "b.mrc"), os.path.join(data, "b.tlt"), "two", 12, "", "true", other]])
+        [os.path.join(data, "b.mrc"), os.path.join(data, "b.tlt"), "two", 12, "", "TRUE", other]])
     results = os.path.join(folder, "results")
     harness.succeed("batch", table, *QUICK, "-o", results)
     one = os.path.join(results, "one, first.mrc")

@@ -137,6 +137,20 @@ def test_particles_of_relion_lie_on_the_middle_voxel(folder, box, angpix):
         np.testing.assert_allclose(found, (PLACES[i] - SIZE / 2) * PIXEL_A, atol=1e-4)
 
 
+def test_the_optics_describe_the_subvolumes(folder):
+    particles = write_particles(folder)
+    with open(particles, encoding="utf-8") as file:
+        text = file.read()
+    with open(particles, "w", encoding="utf-8") as file:
+        file.write(text.replace(f"_rlnTomoTiltSeriesPixelSize #3\n1 one {PIXEL_A}\n",
+                                "_rlnTomoTiltSeriesPixelSize #3\n_rlnTomoSubtomogramBinning #4\n"
+                                f"_rlnCtfDataAreCtfPremultiplied #5\n1 one {PIXEL_A} 4.0 1\n"))
+    cut_out(folder, "--particles", particles, "--box", 8, "--angpix", PIXEL_A / 2)
+    (optics,) = read_cut(folder)[2]["optics"]
+    assert float(optics["rlnTomoSubtomogramBinning"]) == 0.5, optics
+    assert optics["rlnCtfDataAreCtfPremultiplied"] == "0", optics
+
+
 def test_angles_of_subtomograms_that_are_not_stated_are_0(folder):
     """RELION takes them so."""
     def cut_with(columns):

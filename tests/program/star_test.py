@@ -169,6 +169,20 @@ def test_sizes_for_relion_are_unbinned(relion, finished):
     assert "no STAR file" in result.stderr, result.stderr
 
 
+@pytest.mark.parametrize("options", [["--tilt-offset", 5], ["--x-axis-tilt", 5], ["--tlt", "other.tlt"],
+                                     ["--pixel-size", 1.1 * PIXEL_SIZE]])
+def test_a_tomogram_that_the_projects_table_does_not_describe_has_no_row(relion, options):
+    np.savetxt(relion.path("other.tlt"), TILTS + 2)
+    result, output = relion.run("--series", "TS_01", *options)
+    assert "no STAR file is written for RELION" in result.stderr, result.stderr
+    assert not os.path.exists(output[:-4] + ".star")
+
+
+def test_a_tilt_axis_beside_a_table_that_aligns_the_views_is_refused(relion):
+    result, _ = relion.run("--series", "TS_01", "--tilt-axis", 30, run=harness.tomofield)
+    assert result.returncode == 2 and "leave --tilt-axis out" in result.stderr, result.stderr
+
+
 @pytest.mark.parametrize("options", [["--bin", 2], ["--bin", 4], ["--bin", 2, "--axes", "xzy"],
                                      ["--bin", 2, "--shift-z", 4], ["--angpix", 1.7 * PIXEL_SIZE]])
 def test_the_axis_is_in_the_middle_of_the_volume_at_any_bin(relion, options):

@@ -129,6 +129,28 @@ def test_export_writes_what_the_command_writes(series, made, tmp_path):
                          voxel_size_A=5)
 
 
+def test_a_part_keeps_its_place(series, options, tmp_path):
+    def origin(tomogram):
+        tomogram.write(tmp_path / "part.mrc", overwrite=True)
+        with mrcfile.open(tmp_path / "part.mrc", header_only=True) as file:
+            return tuple(file.header.origin.tolist())
+
+    part = {**options, "roi": (6, 4, 30, 28)}
+    made = tomofield.reconstruct(series.folder / "s.mrc", **part)
+    linear = tomofield.baseline(series.folder / "s.mrc", "wbp", **part)
+    for tomogram in (made.tomogram, linear.tomogram, made.model.tomogram(), made.model.tomogram(20)):
+        assert tomogram.origin_A == origin(tomogram) == (60, 40, 0), tomogram
+    assert tomofield.read_mrc(tmp_path / "part.mrc").origin_A == (60, 40, 0)
+    tomofield.export(made.model, tmp_path / "all.mrc")
+    assert tomofield.read_mrc(tmp_path / "all.mrc").origin_A == (60, 40, 0)
+    values = made.tomogram.values
+    assert origin(tomofield.Tomogram(values, 10)) == (0, 0, 0)
+    with pytest.raises(tomofield.Error, match="three finite numbers"):
+        tomofield.Tomogram(values, 10, (0, np.nan, 0)).write(tmp_path / "nan.mrc")
+    with pytest.raises(TypeError, match="origin_A"):
+        tomofield.Tomogram(values, 10, (0, 0))
+
+
 def same_files(folder, *names):
     for name in names:
         assert (folder / name).read_bytes() == (folder / f"cli_{name}").read_bytes(), name

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "base/trace.h"
 #include "io/images/mrc.h"
 #include "io/saving/atomic_file.h"
+#include "io/tables/text_lines.h"
 #include "output/box_bounds.h"
 #include "output/model_input_record.h"
 #include "output/sample_model.h"
@@ -61,16 +63,30 @@ io::MrcSpec stack_of(std::int64_t size, std::size_t count, const output::ModelIn
   return spec;
 }
 
+// Describes the subvolumes in a row of the optics. Columns of the images that they replace count
+// for them, too: RELION's pixels are those of the tilt series, binned.
+void describe_images(const ParticleBoxes& boxes, double voxel_A, std::size_t row,
+                     io::StarTable& optics) {
+  optics.set(row, "rlnImagePixelSize", fmt::format("{:.6f}", voxel_A));
+  optics.set(row, "rlnImageSize", std::to_string(boxes.size));
+  optics.set(row, "rlnImageDimensionality", "3");
+  if (optics.has_column("rlnTomoSubtomogramBinning")) {
+    const auto pixel = optics.find(row, "rlnTomoTiltSeriesPixelSize");
+    const auto pixel_A = pixel ? io::parse_number(*pixel) : std::nullopt;
+    optics.set(row, "rlnTomoSubtomogramBinning",
+               pixel_A && *pixel_A > 0 ? fmt::format("{:.6f}", voxel_A / *pixel_A) : "None");
+  }
+  if (optics.has_column("rlnCtfDataAreCtfPremultiplied"))
+    optics.set(row, "rlnCtfDataAreCtfPremultiplied", "0");
+}
+
 void write_list(ParticleList list, const ParticleBoxes& boxes, double voxel_A,
                 const fs::path& stack) {
   for (std::size_t row = 0; row < list.table.num_rows(); ++row)
     list.table.set(row, "rlnImageName", fmt::format("{:06}@{}", row + 1, stack.string()));
   list.table.remove("rlnCtfImage");
-  for (std::size_t row = 0; row < list.optics.num_rows(); ++row) {
-    list.optics.set(row, "rlnImagePixelSize", fmt::format("{:.6f}", voxel_A));
-    list.optics.set(row, "rlnImageSize", std::to_string(boxes.size));
-    list.optics.set(row, "rlnImageDimensionality", "3");
-  }
+  for (std::size_t row = 0; row < list.optics.num_rows(); ++row)
+    describe_images(boxes, voxel_A, row, list.optics);
   io::StarTable general("general", {"rlnTomoSubTomosAre2DStacks"});
   general.add_row({"0"});
   std::string text = io::star_file_text(general);

@@ -2,8 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
+#include <span>
+#include <string>
 #include <system_error>
+#include <vector>
 
 #include "io/is_file.h"
 #include "io/named_file.h"
@@ -15,25 +19,30 @@ namespace tomofield::io {
 namespace fs = std::filesystem;
 namespace {
 
-// Looks for a file in the current folder, and in that of `list` and those above it.
-std::optional<fs::path> look_for(const fs::path& name, const fs::path& list) {
-  if (is_file(name)) return name;
-  std::vector<fs::path> folders;
+// Returns the folders in which the names of `list` may begin, the likeliest first: its own, those
+// above it, and the current one. They are relative to the current one if the list is.
+std::vector<fs::path> roots_of(const fs::path& list) {
   std::error_code failed;
-  fs::path folder = fs::absolute(list, failed).parent_path();
+  const fs::path current = fs::current_path(failed);
+  std::vector<fs::path> roots;
+  fs::path folder = fs::absolute(list, failed).lexically_normal().parent_path();
   while (!failed) {
-    folders.push_back(folder);
+    const fs::path below = folder.lexically_relative(current);
+    const bool is_below = list.is_relative() && !below.empty() && *below.begin() != "..";
+    if (folder == current || (is_below && below == "."))
+      roots.emplace_back();
+    else
+      roots.push_back(is_below ? below : folder);
     if (folder == folder.parent_path()) break;
     folder = folder.parent_path();
   }
-  const auto found = find_named_file(name.string(), folders);
-  return found ? std::optional(found->lexically_normal()) : std::nullopt;
+  if (std::ranges::find(roots, fs::path()) == roots.end()) roots.emplace_back();
+  return roots;
 }
 
-// Looks for an image of Warp, whose names begin in the folder of the table, before that elsewhere.
-std::optional<fs::path> look_for_of_warp(const fs::path& name, const fs::path& list) {
-  const fs::path beside = (list.parent_path() / name).lexically_normal();
-  return is_file(beside) ? std::optional(beside) : look_for(name, list);
+std::optional<fs::path> look_for(const fs::path& name, std::span<const fs::path> roots) {
+  const auto found = find_named_file(name.string(), roots);
+  return found ? std::optional(found->lexically_normal()) : std::nullopt;
 }
 
 // Returns the name of the image that a row means.
@@ -55,31 +64,67 @@ fs::path average_of(const fs::path& movie, Frames frames) {
   return folder / movie.filename().replace_extension(".mrc");
 }
 
-ImageInFile place_of_movie(const ViewTable& table, std::size_t row, Frames frames) {
-  const fs::path movie = table.views[row].image;
-  const fs::path average = average_of(movie, frames);
-  if (const auto found = look_for_of_warp(average, table.file)) return {*found, std::nullopt};
-  const bool may_be_image = frames == Frames::kAll && movie.extension() == ".mrc";
-  if (may_be_image) {
-    if (const auto found = look_for_of_warp(movie, table.file)) return {*found, std::nullopt};
-  }
-  throw Error(fmt::format(
-      "'{}', row {}: the aligned average '{}' of '{}' was found neither from the current folder "
-      "nor "
-      "from that of the table: run Warp's fs_motion_and_ctf with --out_averages{}, or start the "
-      "command in the folder that the names begin from",
-      table.file.string(), row + 1, average.string(), movie.string(),
-      frames == Frames::kAll ? "" : " --out_average_halves"));
+// Returns what a row names: an image, or a movie of Warp.
+ImageInFile named_by(const ViewTable& table, std::size_t row, Frames frames) {
+  return table.names_movies ? ImageInFile{table.views[row].image, std::nullopt}
+                            : parse_image_name(image_of(table, row, frames));
 }
 
-ImageInFile place_of_image(const ViewTable& table, std::size_t row, Frames frames) {
-  ImageInFile place = parse_image_name(image_of(table, row, frames));
-  if (is_view_table(place.file) || place.file.extension() == ".mdoc") {
-    throw Error(fmt::format("'{}', row {}: '{}' is no file of images", table.file.string(), row + 1,
-                            place.file.string()));
+// Returns where the image of a row is, if one of `roots` has it: the average of a movie, or else
+// what the row names.
+std::optional<ImageInFile> find_image(const ViewTable& table, std::size_t row, Frames frames,
+                                      std::span<const fs::path> roots) {
+  const ImageInFile named = named_by(table, row, frames);
+  std::optional<fs::path> found;
+  if (table.names_movies) found = look_for(average_of(named.file, frames), roots);
+  const bool may_be_image =
+      !table.names_movies || (frames == Frames::kAll && named.file.extension() == ".mrc");
+  if (!found && may_be_image) found = look_for(named.file, roots);
+  return found ? std::optional(ImageInFile{*found, named.section}) : std::nullopt;
+}
+
+// Returns the folder in which the names of the table begin: the first that has one of its images.
+// All of the folders if none has.
+std::vector<fs::path> root_of(const ViewTable& table, Frames frames) {
+  std::vector<fs::path> roots = roots_of(table.file);
+  for (const fs::path& root : roots) {
+    for (std::size_t row = 0; row < table.views.size(); ++row) {
+      const bool is_relative = named_by(table, row, frames).file.is_relative();
+      if (is_relative && find_image(table, row, frames, {&root, 1})) return {root};
+    }
   }
-  place.file = find_listed_file(place.file, table.file);
-  return place;
+  return roots;
+}
+
+// Says that the image of a row is in none of the folders where it may be.
+[[noreturn]] void throw_missing(const ViewTable& table, std::size_t row, Frames frames,
+                                const std::vector<fs::path>& roots) {
+  const fs::path named = named_by(table, row, frames).file;
+  const std::string what = table.names_movies
+                               ? fmt::format("the aligned average '{}' of '{}'",
+                                             average_of(named, frames).string(), named.string())
+                               : fmt::format("the image '{}'", named.string());
+  const std::string where =
+      roots.size() == 1
+          ? fmt::format("is not in '{}', where other names of the table begin",
+                        roots.front().empty() ? "." : roots.front().string())
+          : "was found neither in the folder of the table or above it nor in the current folder";
+  const std::string advice =
+      table.names_movies ? fmt::format("run Warp's fs_motion_and_ctf with --out_averages{}, or ",
+                                       frames == Frames::kAll ? "" : " --out_average_halves")
+                         : "";
+  throw Error(fmt::format("'{}', row {}: {} {}: {}start the command in the project's folder",
+                          table.file.string(), row + 1, what, where, advice));
+}
+
+// Refuses tables and lists as images: a table that names itself would never end.
+void require_images(const ViewTable& table, Frames frames) {
+  for (std::size_t row = 0; !table.names_movies && row < table.views.size(); ++row) {
+    const fs::path file = parse_image_name(image_of(table, row, frames)).file;
+    if (is_view_table(file) || file.extension() == ".mdoc")
+      throw Error(fmt::format("'{}', row {}: '{}' is no file of images", table.file.string(),
+                              row + 1, file.string()));
+  }
 }
 
 }  // namespace
@@ -99,18 +144,22 @@ ImageInFile parse_image_name(std::string_view name) {
 }
 
 fs::path find_listed_file(const fs::path& name, const fs::path& list) {
-  if (const auto found = look_for(name, list)) return *found;
+  if (const auto found = look_for(name, roots_of(list))) return *found;
   throw Error(
-      fmt::format("'{}' names '{}', which was found neither in the current folder nor in "
-                  "that of the list or above it: start the command in the project's folder",
+      fmt::format("'{}' names '{}', which was found neither in the folder of the list or above it "
+                  "nor in the current folder: start the command in the project's folder",
                   list.string(), name.string()));
 }
 
 std::vector<ImageInFile> find_view_images(const ViewTable& table, Frames frames) {
+  require_images(table, frames);
+  const std::vector<fs::path> roots = root_of(table, frames);
   std::vector<ImageInFile> places;
-  for (std::size_t row = 0; row < table.views.size(); ++row)
-    places.push_back(table.names_movies ? place_of_movie(table, row, frames)
-                                        : place_of_image(table, row, frames));
+  for (std::size_t row = 0; row < table.views.size(); ++row) {
+    const auto place = find_image(table, row, frames, roots);
+    if (!place) throw_missing(table, row, frames, roots);
+    places.push_back(*place);
+  }
   return places;
 }
 

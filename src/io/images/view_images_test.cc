@@ -50,6 +50,56 @@ TEST(ViewImages, AreFoundFromTheProjectsFolder) {
                {"TS.star", "Motion/b.mrc", "project's folder"});
 }
 
+// Makes a folder the current one for as long as it lives.
+class Inside {
+ public:
+  explicit Inside(const std::filesystem::path& folder) { std::filesystem::current_path(folder); }
+  ~Inside() { std::filesystem::current_path(before_); }
+  Inside(const Inside&) = delete;
+  Inside& operator=(const Inside&) = delete;
+
+ private:
+  std::filesystem::path before_ = std::filesystem::current_path();
+};
+
+// Projects name their files alike.
+TEST(ViewImages, AreThoseOfTheTablesProjectAndOfNoOther) {
+  const ScratchDirectory scratch;
+  const std::string table =
+      "data_t\nloop_\n_rlnMicrographName #1\n_rlnTomoYTilt #2\n_rlnTomoZRot #3\n"
+      "_rlnTomoXShiftAngst #4\n_rlnTomoYShiftAngst #5\nMotion/a.mrc 0 0 0 0\nMotion/b.mrc 3 0 0 "
+      "0\n";
+  for (const char* project : {"A", "B", "A/backup"}) {
+    for (const char* name : {"Motion/a.mrc", "Motion/b.mrc"})
+      stack(scratch / project / name, 1, 1.0f);
+    std::filesystem::create_directories(scratch / project / "Tomograms/job009");
+    scratch.write(std::string(project) + "/Tomograms/job009/TS.star", table);
+  }
+  const std::filesystem::path list = "Tomograms/job009/TS.star";
+  const auto images = [](const std::filesystem::path& file) {
+    std::vector<std::filesystem::path> files;
+    for (const ImageInFile& image : find_view_images(read_view_table(file)))
+      files.push_back(std::filesystem::absolute(image.file).lexically_normal());
+    return files;
+  };
+  const auto images_of = [&](const char* project) {
+    return std::vector<std::filesystem::path>{scratch / project / "Motion/a.mrc",
+                                              scratch / project / "Motion/b.mrc"};
+  };
+  const Inside inside(scratch / "B");
+  EXPECT_EQ(images(list), images_of("B"));
+  EXPECT_EQ(find_listed_file("Motion/a.mrc", list), "Motion/a.mrc") << "relative, as the list";
+  for (const auto& of_a : {scratch / "A" / list, "../A" / list})
+    EXPECT_EQ(images(of_a), images_of("A"));
+  EXPECT_EQ(images(scratch / "A/backup" / list), images_of("A/backup"));
+  std::filesystem::remove(scratch / "A/Motion/b.mrc");
+  expect_parts(message_of<Error>([&] { images(scratch / "A" / list); }),
+               {"TS.star', row 2", "Motion/b.mrc", "is not in", "/A'"});
+  // A table that was copied out of its project is used from the project's folder.
+  std::filesystem::create_directories(scratch / "copies");
+  EXPECT_EQ(images(scratch.write("copies/TS.star", table)), images_of("B"));
+}
+
 TEST(ViewImages, WhoseTiltAxesDifferSaySo) {
   const ScratchDirectory scratch;
   const auto image = [&](const char* name, const char* axis) {

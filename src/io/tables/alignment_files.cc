@@ -88,14 +88,22 @@ TiltTable read_tilt_table(const std::filesystem::path& path) {
     const auto tilt = has_columns ? parse_number(words[0], base::kLargestAngle_deg) : std::nullopt;
     const auto number = has_columns ? parse_integer(words[1]) : std::nullopt;
     const auto dose = has_columns ? parse_number(words.back(), {0.0, kLargestDose}) : std::nullopt;
-    if (!tilt || !number || !dose || !recorded.emplace(*number, table.angles.size()).second)
-      throw_line_error(path, line, kForm);
+    if (!tilt || !number || !dose) throw_line_error(path, line, kForm);
+    if (!recorded.emplace(*number, table.angles.size()).second)
+      throw_line_error(path, line,
+                       fmt::format("of a view of its own: a line before it has place {} in the "
+                                   "order of recording (second column), too",
+                                   *number));
     table.angles.push_back({*tilt, line.number});
     if (num_columns == 3) table.doses.push_back(*dose);
   }
   const std::int64_t first = recorded.begin()->first, last = recorded.rbegin()->first;
   if (first < 0 || first > 1 || last - first + 1 != std::ssize(recorded))
-    throw_line_error(path, lines.front(), kForm);
+    throw_line_error(
+        path, lines.front(),
+        fmt::format("of a table whose places in the order of recording (second column) run from 0 "
+                    "or 1 on without a gap: {} places run from {} to {} here",
+                    recorded.size(), first, last));
   for (const auto& [number, section] : recorded) table.order.push_back(section);
   return table;
 }

@@ -288,6 +288,10 @@ TEST(TiltTable, ReadsTheColumnsOfAreTomo3) {
         "1 1 -3\n2 2 3\n", "1 1 3\n2 2 1e5\n", "1 2 3 4\n2 3 4 5\n"})
     expect_parts(message_of<Error>([&] { read_tilt_table(scratch.write("bad.tlt", bad)); }),
                  {"bad.tlt", "line "});
+  expect_parts(message_of<Error>([&] { read_tilt_table(scratch.write("bad.tlt", "1 1\n3 1\n")); }),
+               {"line 2", "has place 1"});
+  expect_parts(message_of<Error>([&] { read_tilt_table(scratch.write("bad.tlt", "1 1\n3 4\n")); }),
+               {"2 places run from 1 to 4"});
 }
 
 TEST(SectionList, IsWrittenAsItIsRead) {
