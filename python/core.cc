@@ -63,6 +63,8 @@ std::vector<float> values_of(const Array<float>& array) {
   return {array.data(), array.data() + array.size()};
 }
 
+using Places = std::array<std::array<double, 3>, 2>;
+
 Tomogram to_tomogram(const Array<float>& array, double voxel_size_A,
                      const std::array<double, 3>& origin_A = {}) {
   require_dimensions(array, 3, "a volume is an array [z, y, x]");
@@ -393,22 +395,26 @@ void add_evaluate(py::module_& module) {
            "Return where the correlation first falls below a threshold, in Å, or None.");
   module.def(
       "score_volume",
-      [](const Array<float>& volume, const Array<float>& truth, double volume_A, double truth_A) {
-        const Tomogram a = to_tomogram(volume, volume_A), b = to_tomogram(truth, truth_A);
+      [](const Array<float>& volume, const Array<float>& truth, double volume_A, double truth_A,
+         const Places& origins_A) {
+        const Tomogram a = to_tomogram(volume, volume_A, origins_A[0]);
+        const Tomogram b = to_tomogram(truth, truth_A, origins_A[1]);
         const Unlocked unlocked;
         return score_volume(a, b);
       },
       py::arg("volume").noconvert(), py::arg("truth").noconvert(), py::arg("volume_A"),
-      py::arg("truth_A"));
+      py::arg("truth_A"), py::arg("origins_A"));
   module.def(
       "correlate_shells",
-      [](const Array<float>& first, const Array<float>& second, double first_A, double second_A) {
-        const Tomogram a = to_tomogram(first, first_A), b = to_tomogram(second, second_A);
+      [](const Array<float>& first, const Array<float>& second, double first_A, double second_A,
+         const Places& origins_A) {
+        const Tomogram a = to_tomogram(first, first_A, origins_A[0]);
+        const Tomogram b = to_tomogram(second, second_A, origins_A[1]);
         const Unlocked unlocked;
         return correlate_shells(a, b);
       },
       py::arg("first").noconvert(), py::arg("second").noconvert(), py::arg("first_A"),
-      py::arg("second_A"));
+      py::arg("second_A"), py::arg("origins_A"));
 }
 
 }  // namespace

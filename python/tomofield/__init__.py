@@ -17,7 +17,7 @@ from ._core import Error, Progress, VolumeScores, __version__
 from ._projects import Project, Setting, open_project
 from ._records import Record, read_metrics, read_record
 from ._runs import Reconstruction, align, baseline, denoise, reconstruct
-from ._volumes import Box, Model, Tomogram, _own_voxel_size, _voxel_size, export, read_mrc, write_mrc
+from ._volumes import Box, Model, Tomogram, _origins, _own_voxel_size, _voxel_size, export, read_mrc, write_mrc
 from .options import Options
 
 __all__ = ["Box", "Error", "Model", "Options", "Progress", "Project", "Reconstruction", "Record",
@@ -47,7 +47,7 @@ class ShellCorrelation:
 def score_volume(volume: npt.ArrayLike, truth: npt.ArrayLike) -> VolumeScores:
     """Score a volume against the truth: PSNR and SSIM, raw and after the best scale and offset."""
     return _core.score_volume(array_of(volume), array_of(truth), _own_voxel_size(volume),
-                              _own_voxel_size(truth))
+                              _own_voxel_size(truth), _origins(volume, truth))
 
 
 def correlate_shells(first: npt.ArrayLike, second: npt.ArrayLike,
@@ -59,7 +59,8 @@ def correlate_shells(first: npt.ArrayLike, second: npt.ArrayLike,
     size = _voxel_size(voxel_size_A, first, second)
     sizes = [size if voxel_size_A is not None else _own_voxel_size(volume) or size
              for volume in (first, second)]
-    curve = _core.correlate_shells(array_of(first), array_of(second), *sizes)
+    curve = _core.correlate_shells(array_of(first), array_of(second), sizes[0], sizes[1],
+                                   _origins(first, second))
     return ShellCorrelation(curve.frequency_per_A, curve.correlation, curve.voxels, curve)
 
 

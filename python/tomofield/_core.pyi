@@ -2,7 +2,7 @@
 
 import enum
 import pathlib
-from typing import Any, Callable, Dict, List, Optional, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 import numpy.typing as npt
@@ -114,7 +114,8 @@ def write_mrc(volume: npt.NDArray[np.float32], voxel_size_A: float,
               overwrite: bool) -> None: ...
 def score_volume(volume: npt.NDArray[np.float32],
                  truth: npt.NDArray[np.float32], volume_A: float,
-                 truth_A: float) -> VolumeScores: ...
+                 truth_A: float, origins_A: Sequence[Tuple[float, float, float]]) -> VolumeScores: ...
 def correlate_shells(first: npt.NDArray[np.float32], second: npt.NDArray[np.float32],
-                     first_A: float, second_A: float) -> ShellCorrelation: ...
+                     first_A: float, second_A: float,
+                     origins_A: Sequence[Tuple[float, float, float]]) -> ShellCorrelation: ...
 def set_thread_count(count: int) -> None: ...

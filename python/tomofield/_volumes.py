@@ -254,6 +254,13 @@ def _own_voxel_size(volume: Any) -> float:
     return volume.voxel_size_A if isinstance(volume, Tomogram) else 0.0
 
 
+def _origins(*volumes: Any) -> Tuple[Numbers, ...]:
+    """Return the places of volumes. An array, which states none, lies where a Tomogram does."""
+    stated = [volume.origin_A for volume in volumes if isinstance(volume, Tomogram)]
+    return tuple(volume.origin_A if isinstance(volume, Tomogram) else [*stated, (0.0, 0.0, 0.0)][0]
+                 for volume in volumes)
+
+
 def _plausible(size_A: float) -> float:
     """Return the size of a voxel if it can be one."""
     low, high = VOXEL_SIZES_A

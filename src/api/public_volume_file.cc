@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "base/near_whole.h"
 #include "base/plausible.h"
 #include "base/system/memory.h"
 #include "base/threads/parallel.h"
@@ -35,7 +36,8 @@ std::vector<io::OutputLock> claim(const std::filesystem::path& path, bool overwr
 }
 
 bool is_finite(const std::array<double, 3>& origin_A) {
-  return std::ranges::all_of(origin_A, [](double at_A) { return std::isfinite(at_A); });
+  return std::ranges::all_of(origin_A,
+                             [](double at_A) { return std::isfinite(static_cast<float>(at_A)); });
 }
 
 exchange::ExportFiles files_of(const Model& model, const VolumeFile& file) {
@@ -54,7 +56,8 @@ void export_volume(const Model& model, const VolumePlace& place, const VolumeFil
   const exchange::ExportFiles files = files_of(model, file);
   const std::vector<io::OutputLock> locks = exchange::claim_export(files, kAdvice);
   require_usable_voxels(place.voxel_px);
-  exchange::ExportPlace placed{.voxel_px = place.voxel_px, .level = place.level};
+  exchange::ExportPlace placed{.voxel_px = base::whole_if_near(place.voxel_px),
+                               .level = place.level};
   if (place.box) placed.box = oriented_box(*place.box);
   const output::Model& field = ModelAccess::model(model);
   exchange::export_volume(field, exchange::box_in_field(field, placed), files);
@@ -76,10 +79,11 @@ CutParticles export_particles(const Model& model, const ParticleCuts& cuts,
   files.particles = cuts.list;
   const std::vector<io::OutputLock> locks = exchange::claim_export(files, kAdvice);
   require_usable_voxels(cuts.voxel_px);
-  return exchange::export_particles(
-      ModelAccess::model(model),
-      {.size = cuts.size, .voxel_px = cuts.voxel_px, .levelling = cuts.level.value_or(Levelling{})},
-      cuts.tomogram, files);
+  return exchange::export_particles(ModelAccess::model(model),
+                                    {.size = cuts.size,
+                                     .voxel_px = base::whole_if_near(cuts.voxel_px),
+                                     .levelling = cuts.level.value_or(Levelling{})},
+                                    cuts.tomogram, files);
 }
 
 Tomogram read_mrc(const std::filesystem::path& path) {

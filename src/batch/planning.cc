@@ -18,8 +18,10 @@
 #include "batch/series_list.h"
 #include "batch/slurm.h"
 #include "batch/state_record.h"
+#include "io/lower_extension.h"
 #include "io/saving/output_folder.h"
 #include "io/saving/output_lock.h"
+#include "io/tables/relion_star.h"
 #include "tomofield/error.h"
 
 namespace tomofield::batch {
@@ -78,6 +80,20 @@ void warn_of_missing_rows(const std::vector<std::string>& names) {
                   fmt::join(names, ", ")));
 }
 
+bool is_relion_table(const fs::path& file) {
+  return io::lower_extension(file) == ".star" && io::lists_tomograms(file);
+}
+
+// Names tomograms of RELION that it could not use as its own, whose runs write no row.
+void warn_of_unsuited(const std::vector<std::string>& names) {
+  if (names.empty()) return;
+  base::log_warning(fmt::format(
+      "{} will have no row for RELION, and none in the tomograms.star of the batch, since "
+      "the options give these tomograms another place than the project has (the log of "
+      "each says which)",
+      fmt::join(names, ", ")));
+}
+
 // Returns the outputs of a stopped batch with --overwrite that are still those of before it.
 std::set<fs::path> outputs_to_replace(const PlanOptions& options) {
   std::set<fs::path> outputs;
@@ -124,6 +140,7 @@ class Planner {
     check_files(options_.folder, options_.list, jobs, faults_);
     require_none(faults_);
     warn_of_missing_rows(without_row_);
+    warn_of_unsuited(unsuited_);
   }
 
  private:
@@ -159,6 +176,8 @@ class Planner {
     }
     const record::PlanRecord planned = record::read_plan(plan);
     add_plan(planned, job);
+    if (job.files.relion_tomogram.empty() && std::ranges::any_of(planned.inputs, is_relion_table))
+      unsuited_.push_back(job.name);
     stacks_.require_new(planned.stack, series, faults_);
   }
 
@@ -167,7 +186,7 @@ class Planner {
   const std::set<fs::path> to_replace_;
   base::Faults faults_;
   Stacks stacks_;
-  std::vector<std::string> without_row_;
+  std::vector<std::string> without_row_, unsuited_;
 };
 
 }  // namespace

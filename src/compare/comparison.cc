@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "base/log.h"
 #include "compare/comparison_record.h"
 #include "compare/folder.h"
 #include "compare/grid.h"
@@ -174,6 +175,17 @@ ComparisonRecord record_of(const CompareOptions& options, const std::vector<Row>
   return record;
 }
 
+// Warns of beads that a method with trials may mask, and that methods without trials keep.
+void warn_of_undecided_beads(const tilt_series::MeasuredSeries& series) {
+  const tilt_series::MaskMetrics& masks = series.mask_metrics();
+  if (masks.bead_masking != tilt_series::BeadMasking::kUndecided) return;
+  base::log_warning(fmt::format(
+      "methods may treat the {} of this bright series differently, so that they count on other "
+      "pixels: trials decide whether tomofield masks them, and baselines keep them. Give "
+      "--bead-diameter {:.3g} to mask them for all methods, or --bead-diameter 0",
+      describe_beads(masks), masks.bead_diameter_A / 10));
+}
+
 }  // namespace
 
 void check_comparison(const CompareOptions& options) {
@@ -187,6 +199,7 @@ Outcome compare_methods(const CompareOptions& options, const RunHooks& hooks) {
   // Broken views are found before the runs, which read them.
   const tilt_series::MeasuredSeries series(
       tilt_series::series_options(options.files, options.series));
+  warn_of_undecided_beads(series);
   const PlannedRuns plan = plan_runs(options, series);
   const io::OutputFolder folder(options.folder);
   const io::OutputLock lock(options.folder / "comparison.json");

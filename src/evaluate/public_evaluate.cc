@@ -2,8 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 
+#include "base/log.h"
 #include "base/plausible.h"
 #include "base/threads/parallel.h"
 #include "evaluate/resolution/fsc.h"
@@ -26,6 +30,22 @@ base::Volume volume_of(const Tomogram& tomogram, const char* name) {
   return volume;
 }
 
+// Warns of volumes that state two places (origin_A).
+void warn_of_places(const Tomogram& first, const char* first_name, const Tomogram& second,
+                    const char* second_name, double voxel_A) {
+  constexpr double kSamePlace = 0.01;  // voxels
+  if (!(voxel_A > 0)) return;
+  std::array<double, 3> apart{};
+  for (std::size_t a = 0; a < 3; ++a) apart[a] = (second.origin_A[a] - first.origin_A[a]) / voxel_A;
+  if (std::ranges::all_of(apart, [](double voxels) { return std::abs(voxels) < kSamePlace; }))
+    return;
+  base::log_warning(
+      fmt::format("the {} begins {:.4g}, {:.4g}, {:.4g} voxels after the {} (origin_A): compared "
+                  "voxel by voxel "
+                  "all the same",
+                  second_name, apart[0], apart[1], apart[2], first_name));
+}
+
 evaluate::VolumePair pair_of(const Tomogram& first, const char* first_name, const Tomogram& second,
                              const char* second_name) {
   evaluate::VolumePair pair{
@@ -39,6 +59,7 @@ evaluate::VolumePair pair_of(const Tomogram& first, const char* first_name, cons
       evaluate::common_voxel_size_A(fmt::format("the {}", first_name), first.voxel_size_A,
                                     fmt::format("the {}", second_name), second.voxel_size_A);
   pair.first.voxel_size_A = pair.second.voxel_size_A = voxel_A;
+  warn_of_places(first, first_name, second, second_name, voxel_A);
   return pair;
 }
 

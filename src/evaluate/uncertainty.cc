@@ -12,6 +12,7 @@
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/box.h"
+#include "output/volume.h"
 #include "tomofield/version.h"
 
 namespace tomofield::evaluate {
@@ -79,6 +80,7 @@ void write_uncertainty(const std::filesystem::path& first, const std::filesystem
   const SectionPair halves(first, second);
   const std::int64_t nx = halves.header().nx, ny = halves.header().ny, nz = halves.header().nz;
   io::MrcWriter map(path, map_like(halves.header(), "standard error of the mean of the halves"));
+  const auto half_a_value = static_cast<float>(0.5 / output::stored_factor(halves.header()));
   std::deque<std::vector<float>> sums;  // of the squares of a section, of those within reach
   std::int64_t first_sum = 0;           // the section of sums.front()
   for (std::int64_t z = 0; z < nz; ++z) {
@@ -96,7 +98,7 @@ void write_uncertainty(const std::filesystem::path& first, const std::filesystem
         float sum = 0.0f;
         for (const std::vector<float>& section : sums) sum += section[at];
         const int voxels = reach.size() * reach_of(y, ny).size() * reach_of(x, nx).size();
-        error[at] = 0.5f * std::sqrt(sum / static_cast<float>(voxels));
+        error[at] = half_a_value * std::sqrt(sum / static_cast<float>(voxels));
       }
     });
     map.write_section(z, error);

@@ -16,6 +16,7 @@
 #include "io/saving/output_set.h"
 #include "io/tables/relion_star.h"
 #include "output/output_paths.h"
+#include "tilt_series/series_plan.h"
 #include "tomofield/error.h"
 
 namespace tomofield::exchange {
@@ -56,9 +57,8 @@ bool are_views_elsewhere(const options::ReconstructOptions& options) {
 
 // Says whether the table's size of a pixel is not the one that is used.
 bool are_pixels_others(const options::ReconstructOptions& options) {
-  return std::ranges::any_of(options.settings, [](const Setting& setting) {
-    return setting.option == "--pixel-size" && !setting.instead.empty();
-  });
+  const auto stated_A = tilt_series::replaced_pixel_size_A(options.settings);
+  return stated_A && stated_A != options.views.pixel_size_A;
 }
 
 // Says why RELION could not use the volume, or nothing if it can.
@@ -80,17 +80,26 @@ void remove_with_commit(const fs::path& file) {
   if (io::OutputSet* const results = io::OutputSet::active()) results->remove_old(file);
 }
 
+// Returns the name of a file from the project's folder, as RELION takes names; an absolute one if
+// it lies elsewhere. An empty root is the current folder.
+std::string name_from(const fs::path& root, const fs::path& file) {
+  if (root.empty()) return file.string();
+  const fs::path absolute = fs::absolute(file).lexically_normal();
+  const fs::path name = absolute.lexically_relative(fs::absolute(root).lexically_normal());
+  return name.empty() || *name.begin() == ".." ? absolute.string() : name.string();
+}
+
 // Names the linear halves if the run wrote them. RELION compares half maps and trains denoisers
 // with them, which needs independent errors: the errors of fitted halves are alike. Halves that
 // another program named belong to another tomogram.
-void set_halves(const fs::path& volume, io::StarTable& table) {
+void set_halves(const fs::path& volume, const fs::path& root, io::StarTable& table) {
   const io::OutputSet* const results = io::OutputSet::active();
   const output::OutputPaths paths = output::output_paths(volume);
   for (const std::size_t half : {0, 1}) {
     const std::string column = fmt::format("{}Half{}", kTomogram, half + 1);
     const fs::path& linear = paths.halves[half].linear_volume;
     if (results != nullptr && results->contains(linear))
-      table.set(0, column, linear.string());
+      table.set(0, column, name_from(root, linear));
     else
       table.remove(column);
   }
@@ -147,12 +156,15 @@ void write_relion_output(const options::ReconstructOptions& options, const fs::p
   table.set(0, "rlnTomoSizeX", unbinned(header.nx));
   table.set(0, "rlnTomoSizeY", unbinned(header.ny));
   table.set(0, "rlnTomoSizeZ", unbinned(header.nz));
-  if (const auto aligned = relion_alignment(options)) table.set(0, kEntry, aligned->string());
-  table.set(0, kTomogram, path.string());
-  set_halves(path, table);
+  const fs::path root = io::root_of_listed_file(all.tomograms[row].tilt_series_star, origin->file);
+  const std::string name = name_from(root, path);
+  if (const auto aligned = relion_alignment(options))
+    table.set(0, kEntry, name_from(root, *aligned));
+  table.set(0, kTomogram, name);
+  set_halves(path, root, table);
   // Programs know the denoised tomogram by either name; RELION 5 by the second.
-  table.set(0, "rlnTomoDenoisedTomogram", path.string());
-  table.set(0, "rlnTomoReconstructedTomogramDenoised", path.string());
+  table.set(0, "rlnTomoDenoisedTomogram", name);
+  table.set(0, "rlnTomoReconstructedTomogramDenoised", name);
   io::write_text_file(*relion_output(options), io::star_file_text(table));
 }
 

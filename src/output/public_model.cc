@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/near_whole.h"
 #include "base/threads/parallel.h"
 #include "field/sampling/sample_box.h"
 #include "output/sample_model.h"
@@ -102,7 +103,7 @@ double Model::pixel_size_A() const { return impl_->model.pixel_size_A; }
 
 SampleBox Model::region(double voxel_px) const {
   require_usable_voxels(voxel_px);
-  const field::OrientedBox box = output::tomogram_box(impl_->model, voxel_px);
+  const field::OrientedBox box = output::tomogram_box(impl_->model, base::whole_if_near(voxel_px));
   return {.centre_px = box.centre_px, .size = box.size, .voxel_px = box.voxel_px};
 }
 

@@ -7,6 +7,8 @@
 #include <memory>
 #include <mutex>
 #include <span>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -21,6 +23,7 @@
 #include "io/saving/output_files.h"
 #include "io/saving/output_set.h"
 #include "io/saving/output_target.h"
+#include "io/tables/text_lines.h"
 #include "output/box_bounds.h"
 #include "output/model_input_record.h"
 #include "output/sample_model.h"
@@ -140,12 +143,25 @@ io::MrcMode mrc_mode(VoxelType type) {
   return io::MrcMode::kFloat32;
 }
 
+constexpr std::string_view kStored = ", stored = ";  // in the label of a volume of integers
+
 double int16_factor(double largest_value, std::string& label) {
   constexpr double kLargestStored = 32000.0;
   const double largest = std::abs(largest_value);
   const double factor = largest > 0 ? kLargestStored / largest : 1.0;
-  label += fmt::format(", stored = {:.6g} x value", factor);
+  label += fmt::format("{}{:.6g} x value", kStored, factor);
   return factor;
+}
+
+double stored_factor(const io::MrcHeader& header) {
+  for (const std::string& label : header.labels) {
+    const std::size_t at = label.find(kStored);
+    if (at == std::string::npos) continue;
+    const std::string number = label.substr(at + kStored.size());
+    const auto factor = io::parse_number(number.substr(0, number.find(' ')));
+    return factor ? double{*factor} : 1.0;
+  }
+  return 1.0;
 }
 
 std::vector<std::string> faults_of(const VolumeOptions& options) {

@@ -59,6 +59,9 @@ field::OrientedBox tomogram_box(const ModelInfo& model, double voxel_px);
 std::array<double, 3> corner_A(const ModelInfo& info, const field::OrientedBox& box,
                                VolumeAxes axes = VolumeAxes::kXyz);
 
+/// Returns the factor by which the values of a volume were stored, as its label says, or 1.
+double stored_factor(const io::MrcHeader& header);
+
 /// Returns tomogram_box() where it lies in the field: turned back by the x-axis tilt and brought
 /// level.
 field::OrientedBox region_box(const ModelInfo& model, double voxel_px,

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <utility>
 
 #include "io/saving/file_identity.h"
 #include "io/tables/mdoc_images.h"
+#include "io/tables/view_table.h"
 #include "tilt_series/decode_view.h"
 #include "tilt_series/half_stacks.h"
 #include "tilt_series/masks/series_masks.h"
@@ -20,12 +22,20 @@
 namespace tomofield::tilt_series {
 namespace {
 
+// Says whether two stacks are one file. "even@TABLE" and "odd@TABLE" are two stacks of one table.
+bool are_one_stack(const std::filesystem::path& a, const std::filesystem::path& b) {
+  const std::string table_a = io::without_half(a).string(), table_b = io::without_half(b).string();
+  const bool is_same_half = a.string().substr(0, a.string().size() - table_a.size()) ==
+                            b.string().substr(0, b.string().size() - table_b.size());
+  return is_same_half && io::identity_of(table_a) == io::identity_of(table_b);
+}
+
 // Refuses halves that are one file, or that are the stack of all frames: their noise would be one.
 void require_two_halves(const TiltSeriesOptions& options) {
   const std::filesystem::path &even = *options.even, &odd = *options.odd;
   const auto refuse_if_same = [](const std::filesystem::path& a, const std::filesystem::path& b,
                                  const char* what) {
-    if (io::identity_of(a) == io::identity_of(b))
+    if (are_one_stack(a, b))
       throw Error(fmt::format("'{}' and '{}' are one file: {}", a.string(), b.string(), what));
   };
   refuse_if_same(even, odd, "give --even and --odd the stacks of two halves of the frames");

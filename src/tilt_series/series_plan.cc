@@ -9,12 +9,14 @@
 
 #include "base/check.h"
 #include "base/log.h"
+#include "base/near_whole.h"
 #include "base/plausible.h"
 #include "geometry/raw_from_aligned.h"
 #include "io/images/mrc.h"
 #include "io/images/mrc_format.h"
 #include "io/saving/scratch_memory.h"
 #include "io/tables/alignment_files.h"
+#include "io/tables/text_lines.h"
 #include "io/tables/view_table.h"
 #include "tilt_series/contradictions.h"
 #include "tilt_series/local/file_motion.h"
@@ -194,19 +196,12 @@ void warn_of_sections_beyond(const TiltSeriesOptions& options, const io::ImageSt
       stack.name(), stack.header().nz, facts->sections_beyond));
 }
 
-// Returns the whole number that a factor is but for the digits of a pixel size: headers round it to
-// 7, and factors that are not whole resample the views.
-double whole_if_near(double factor) {
-  constexpr double kRounding = 1e-5;
-  return std::fabs(factor - std::round(factor)) <= kRounding * factor ? std::round(factor) : factor;
-}
-
 double find_bin_factor(const TiltSeriesOptions& options, const SeriesPlan& plan) {
   if (options.angpix && options.bin != 1.0) {
     throw Error("--bin and --angpix both set the size of the binned pixels; give one of them");
   }
   const double factor =
-      whole_if_near(options.angpix ? *options.angpix / plan.pixel_size_A : options.bin);
+      base::whole_if_near(options.angpix ? *options.angpix / plan.pixel_size_A : options.bin);
   if (!std::isfinite(factor) || factor < 1.0) {
     throw Error(options.angpix
                     ? fmt::format("--angpix {} is below the stack's pixel size of {} Å: views can "
@@ -315,8 +310,17 @@ void correct(const geometry::ViewCorrection& correction, PlannedView& planned) {
 
 }  // namespace
 
+std::optional<double> replaced_pixel_size_A(std::span<const Setting> settings) {
+  const auto replaced = std::ranges::find_if(settings, [](const Setting& setting) {
+    return setting.option == "--pixel-size" && !setting.instead.empty();
+  });
+  return replaced == settings.end() ? std::nullopt
+                                    : std::optional<double>(io::parse_number(replaced->value));
+}
+
 TiltSeriesOptions series_options(const SeriesFiles& files, const Options& options) {
   TiltSeriesOptions series{files, options.views};
+  series.listed_pixel_size_A = replaced_pixel_size_A(options.settings);
   series.resample = options.fit.engine == Engine::kSlab;
   series.starts_raw = options.run.align == Alignment::kFull;
   series.applies_local = series.resample && options.run.align == Alignment::kOff;
@@ -349,11 +353,12 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
   const auto mdoc = options.mdoc ? std::optional(io::read_mdoc(*options.mdoc)) : std::nullopt;
   SeriesPlan plan;
   plan.pixel_size_A = find_pixel_size(options, stack, mdoc);
-  const auto table = find_section_table(options, stack, plan.pixel_size_A);
+  const double listed_A = options.listed_pixel_size_A.value_or(plan.pixel_size_A);
+  const auto table = find_section_table(options, stack, listed_A);
   require_no_axis_beside(options, table);
   const TiltAngles angles = find_tilt_angles(options, stack, table, mdoc);
   const std::vector<double> x_tilts_deg = find_x_tilts(options, stack, table);
-  const ReplacedTable replaced(options, stack, table, plan.pixel_size_A);
+  const ReplacedTable replaced(options, stack, table, listed_A);
   auto excluded = io::parse_section_list(options.exclude, header.nz);
   replaced.exclude_unused(excluded);
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct TiltSeriesOptions : SeriesFiles, ViewOptions {
   bool starts_raw = false;
   /// False: local alignments of files are left out, as for views that will be aligned.
   bool applies_local = true;
+  /// The pixels by which a table of a project states shifts in Å, where --pixel-size says others.
+  std::optional<double> listed_pixel_size_A = {};
   /// Takes decoded views that do not fit in memory; empty: the system's folder for such files.
   std::filesystem::path scratch_dir = {};
   /// [section]: changes of the alignment that the files give. Empty: none. Local motion
@@ -32,6 +35,9 @@ struct TiltSeriesOptions : SeriesFiles, ViewOptions {
   /// Sections that are left out beside `exclude`, counted from 0, ascending.
   std::vector<std::int64_t> left_out = {};
 };
+
+/// Returns the size of a pixel that the files of a project state, if another one is given.
+std::optional<double> replaced_pixel_size_A(std::span<const Setting> settings);
 
 /// Returns how a tilt series is read. Views stay as they were recorded for the ray engine. Scratch
 /// files go beside the output, if there is one.

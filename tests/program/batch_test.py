@@ -324,8 +324,9 @@ def test_all_tomograms_of_relion_are_reconstructed():
     rows = star_projects.read_rows(os.path.join(results, "tomograms.star"))
     for row, before in zip(rows, star_projects.read_rows(star), strict=True):
         assert row == {**row, **before}  # sizes are the same, since nothing is binned
-        assert row["rlnTomoReconstructedTomogram"] == os.path.join(results,
-                                                                   before["rlnTomoName"] + ".mrc")
+        assert row["rlnTomoReconstructedTomogram"] == f"results/{before['rlnTomoName']}.mrc"
+    said = harness.succeed("batch", star, *QUICK[2:], "--tilt-offset", 3, "--dry-run", "-o", results + "3")
+    assert "TS_01, TS_02 will have no row for RELION" in said.stderr, said.stderr
     views = os.path.join(folder, "Tomograms/job009/tilt_series/TS_01.star")
     plan = harness.succeed("batch", views, *QUICK, "--dry-run", "-o", results + "2").stdout
     assert plan.startswith("TS_01:") and "1 of 1 series" in plan

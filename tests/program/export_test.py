@@ -159,6 +159,21 @@ def test_binned_voxels_are_means(whole):
     np.testing.assert_allclose(origin, np.array([X0 + 0.5, Y0 + 0.5, 0]) * PIXEL_A, atol=1e-4)
 
 
+def test_a_size_that_the_header_has_rounded_is_that_of_the_pixels(tmp_path):
+    """A header states the cell, so 7.3 Å come back as 7.2999998."""
+    harness.succeed("simulate", tmp_path / "s", "--size", 61, "--thickness", 23, "--voxel-size", 7.3,
+                    "--tilts=-60:60:12")
+    harness.succeed("reconstruct", tmp_path / "s/tilt_series.mrc", "--tlt",
+                    tmp_path / "s/tilt_series.tlt", "--thickness", 23, "--contrast", "bright",
+                    "--no-margin", "--epochs", 1, "--coarse-epochs", 2, "--tv", 5, "--prior", "tv",
+                    "--bead-diameter", 0, "-o", tmp_path / "s.mrc")
+    for angpix, bin_factor in ((7.3, 1), (14.6, 2), (3.65, 0.5)):
+        by_size, by_bin = tmp_path / "size.mrc", tmp_path / "bin.mrc"
+        harness.succeed("export", tmp_path / "s.h5", "-o", by_size, "--angpix", angpix, "--overwrite")
+        harness.succeed("export", tmp_path / "s.h5", "-o", by_bin, "--bin", bin_factor, "--overwrite")
+        assert by_size.read_bytes() == by_bin.read_bytes(), angpix
+
+
 def test_axes_rotation_and_sign(whole):
     # With IMOD's axes, trimvol -rx turns the sections back: z = rows - 1 - row.
     values = export("--axes", "xzy")[0]

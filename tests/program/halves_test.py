@@ -286,6 +286,11 @@ def test_other_forms_of_the_volume(series):
             with mrcfile.open(path) as file:
                 labels.append(file.get_labels())
         assert labels[0] == labels[1] and "stored =" in labels[0][0], labels
+    # Nor has the uncertainty the factor, which is in no label of it.
+    as_floats = series.run("floats", *series.options(), "--axes", "xzy", "--invert", "--roi",
+                           "4,3,44,33", "--bin", 2)
+    uncertainty, reference = (read_volume(made.maps[1]) for made in (results, as_floats))
+    np.testing.assert_allclose(uncertainty.mean(), reference.mean(), rtol=1e-2)
     assert max(np.abs(read_volume(path)).max() for path in results.linear) == 32000
     for path in results.maps:
         assert read_volume(path).shape == volumes[0].shape

@@ -154,6 +154,14 @@ def test_bright_particles_stay_where_the_trials_are_a_tie(bright):
     assert found > 5 and empty < 2, (found, empty)
 
 
+def test_methods_that_may_treat_bright_beads_differently_are_named(bright):
+    folder = harness.fresh_directory("bright_compared")
+    command = ["compare", *bright, "--methods", "wbp", "--thickness", 24, "-o", folder, "--overwrite"]
+    said = harness.succeed(*command).stderr
+    assert "methods may treat the 6 beads" in said and "--bead-diameter 0" in said, said
+    assert "may treat" not in harness.succeed(*command, "--bead-diameter", 0).stderr
+
+
 def test_voxel_baselines_mask_beads_too(beads):
     _, mask, _ = reconstruct("sirt", beads, command=("baseline", "sirt"),
                              quick=["--thickness", 24, "--iterations", 2])

@@ -178,6 +178,40 @@ def test_a_tomogram_that_the_projects_table_does_not_describe_has_no_row(relion,
     assert not os.path.exists(output[:-4] + ".star")
 
 
+def test_shifts_count_in_the_pixels_of_the_project(relion):
+    """A pixel size that was calibrated again leaves the alignment as it is."""
+    def offsets(*options):
+        _, output = relion.run("--series", "TS_01", "--alignment-json", *options)
+        with open(output[:-4] + "_alignment.json", encoding="utf-8") as file:
+            sections = json.load(file)["per_section_alignment_parameters"]
+        return [(section["x_offset"], section["y_offset"]) for section in sections]
+
+    np.testing.assert_allclose(offsets("--pixel-size", 1.1 * PIXEL_SIZE), offsets(), atol=1e-6)
+    _, output = relion.run("--series", "TS_01", "--pixel-size", PIXEL_SIZE)
+    assert os.path.exists(output[:-4] + ".star"), "the pixels are those of the project"
+
+
+def test_names_in_a_row_begin_in_the_projects_folder(relion):
+    """A run may start elsewhere, and write there."""
+    outside = harness.fresh_directory("relion_outside")
+    for output, name in ((relion.path("inside.mrc"), "inside.mrc"),
+                         (os.path.join(outside, "far.mrc"), os.path.join(outside, "far.mrc"))):
+        harness.succeed("reconstruct", relion.star, "--series", "TS_01", "-o",
+                        os.path.relpath(output, outside), "--thickness", THICKNESS, *QUICK, cwd=outside)
+        (row,) = star_projects.read_rows(output[:-4] + ".star")
+        assert row["rlnTomoReconstructedTomogram"] == row["rlnTomoDenoisedTomogram"] == name, row
+        assert os.path.exists(relion.path(row["rlnTomoTiltSeriesStarFile"]))
+
+
+def test_halves_of_a_table_may_be_named_from_any_folder(relion):
+    folder = os.path.join(relion.folder, "deep/er")
+    os.makedirs(folder, exist_ok=True)
+    table = "../../Tomograms/job009/tilt_series/TS_01.star"
+    said = harness.tomofield("reconstruct", relion.star, "--series", "TS_01", "--dry-run", "--even",
+                             f"even@{table}", "--odd", f"odd@{table}", "-o", "x.mrc", cwd=folder).stderr
+    assert "one file" not in said and "names no image of the even frames" in said, said
+
+
 def test_a_tilt_axis_beside_a_table_that_aligns_the_views_is_refused(relion):
     result, _ = relion.run("--series", "TS_01", "--tilt-axis", 30, run=harness.tomofield)
     assert result.returncode == 2 and "leave --tilt-axis out" in result.stderr, result.stderr

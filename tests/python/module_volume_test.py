@@ -129,7 +129,7 @@ def test_export_writes_what_the_command_writes(series, made, tmp_path):
                          voxel_size_A=5)
 
 
-def test_a_part_keeps_its_place(series, options, tmp_path):
+def test_a_part_keeps_its_place(series, options, tmp_path, caplog):
     def origin(tomogram):
         tomogram.write(tmp_path / "part.mrc", overwrite=True)
         with mrcfile.open(tmp_path / "part.mrc", header_only=True) as file:
@@ -144,6 +144,13 @@ def test_a_part_keeps_its_place(series, options, tmp_path):
     tomofield.export(made.model, tmp_path / "all.mrc")
     assert tomofield.read_mrc(tmp_path / "all.mrc").origin_A == (60, 40, 0)
     values = made.tomogram.values
+    elsewhere = tomofield.Tomogram(values, 10, (80, 40, 0))
+    for score in (tomofield.score_volume, tomofield.correlate_shells):
+        caplog.clear()
+        score(elsewhere, values)  # an array states no place
+        assert "voxels after" not in caplog.text
+        score(made.tomogram, elsewhere)
+        assert "begins 2, 0, 0 voxels after" in caplog.text
     assert origin(tomofield.Tomogram(values, 10)) == (0, 0, 0)
     with pytest.raises(tomofield.Error, match="three finite numbers"):
         tomofield.Tomogram(values, 10, (0, np.nan, 0)).write(tmp_path / "nan.mrc")

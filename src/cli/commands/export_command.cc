@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/check.h"
+#include "base/near_whole.h"
 #include "cli/commands/commands.h"
 #include "cli/options/common_options.h"
 #include "cli/options/help_formatter.h"
@@ -98,7 +99,8 @@ std::optional<Levelling> levelling_of(const ExportArguments& arguments, const Mo
 }
 
 double voxel_px_of(const ExportArguments& arguments, const Model& model) {
-  return arguments.voxel_size_A ? *arguments.voxel_size_A / model.pixel_size_A : arguments.bin;
+  return base::whole_if_near(arguments.voxel_size_A ? *arguments.voxel_size_A / model.pixel_size_A
+                                                    : arguments.bin);
 }
 
 OrientedBox box_between_corners(const std::string& corners, double voxel_px) {

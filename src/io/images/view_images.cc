@@ -29,10 +29,7 @@ std::vector<fs::path> roots_of(const fs::path& list) {
   while (!failed) {
     const fs::path below = folder.lexically_relative(current);
     const bool is_below = list.is_relative() && !below.empty() && *below.begin() != "..";
-    if (folder == current || (is_below && below == "."))
-      roots.emplace_back();
-    else
-      roots.push_back(is_below ? below : folder);
+    roots.push_back(folder == current ? fs::path() : is_below ? below : folder);
     if (folder == folder.parent_path()) break;
     folder = folder.parent_path();
   }
@@ -109,12 +106,35 @@ std::vector<fs::path> root_of(const ViewTable& table, Frames frames) {
           ? fmt::format("is not in '{}', where other names of the table begin",
                         roots.front().empty() ? "." : roots.front().string())
           : "was found neither in the folder of the table or above it nor in the current folder";
-  const std::string advice =
+  const std::string warp =
       table.names_movies ? fmt::format("run Warp's fs_motion_and_ctf with --out_averages{}, or ",
                                        frames == Frames::kAll ? "" : " --out_average_halves")
                          : "";
-  throw Error(fmt::format("'{}', row {}: {} {}: {}start the command in the project's folder",
-                          table.file.string(), row + 1, what, where, advice));
+  const char* const advice = roots.size() == 1
+                                 ? "put it there, or take its row out of the table"
+                                 : "start the command in the folder in which the names begin";
+  throw Error(fmt::format("'{}', row {}: {} {}: {}{}", table.file.string(), row + 1, what, where,
+                          warp, advice));
+}
+
+// Refuses a table with absolute names of which some files are there, and others elsewhere: the old
+// place of a project that was moved has some left.
+void require_one_place(const ViewTable& table, const std::vector<ImageInFile>& places,
+                       Frames frames) {
+  std::optional<std::size_t> as_named, moved;
+  for (std::size_t row = 0; row < places.size(); ++row) {
+    const fs::path file = named_by(table, row, frames).file;
+    const fs::path named = table.names_movies ? average_of(file, frames) : file;
+    if (!named.is_absolute()) continue;
+    (places[row].file == named.lexically_normal() ? as_named : moved) = row;
+  }
+  if (!as_named || !moved) return;
+  throw Error(fmt::format(
+      "'{}': the image of row {} is '{}', as the table names it, and that of row {} is not at its "
+      "name, but may be '{}': a series is of one place, so move the old folder away or correct the "
+      "names",
+      table.file.string(), *as_named + 1, places[*as_named].file.string(), *moved + 1,
+      places[*moved].file.string()));
 }
 
 // Refuses tables and lists as images: a table that names itself would never end.
@@ -151,6 +171,14 @@ fs::path find_listed_file(const fs::path& name, const fs::path& list) {
                   list.string(), name.string()));
 }
 
+fs::path root_of_listed_file(const fs::path& name, const fs::path& list) {
+  if (name.is_absolute()) return {};
+  const std::vector<fs::path> roots = roots_of(list);
+  const auto has_file = [&](const fs::path& root) { return is_file(root / name); };
+  const auto root = std::ranges::find_if(roots, has_file);
+  return root == roots.end() ? fs::path() : *root;
+}
+
 std::vector<ImageInFile> find_view_images(const ViewTable& table, Frames frames) {
   require_images(table, frames);
   const std::vector<fs::path> roots = root_of(table, frames);
@@ -160,6 +188,7 @@ std::vector<ImageInFile> find_view_images(const ViewTable& table, Frames frames)
     if (!place) throw_missing(table, row, frames, roots);
     places.push_back(*place);
   }
+  require_one_place(table, places, frames);
   return places;
 }
 

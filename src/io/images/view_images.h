@@ -20,6 +20,11 @@ ImageInFile parse_image_name(std::string_view name);
 std::filesystem::path find_listed_file(const std::filesystem::path& name,
                                        const std::filesystem::path& list);
 
+/// Returns the folder in which the name of a file that `list` names begins, as find_listed_file()
+/// finds it: empty for the current folder, and for an absolute name.
+std::filesystem::path root_of_listed_file(const std::filesystem::path& name,
+                                          const std::filesystem::path& list);
+
 /// The images of a view: those of all its frames, or of half of them.
 enum class Frames { kAll, kEven, kOdd };
 

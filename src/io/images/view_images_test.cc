@@ -100,6 +100,23 @@ TEST(ViewImages, AreThoseOfTheTablesProjectAndOfNoOther) {
   EXPECT_EQ(images(scratch.write("copies/TS.star", table)), images_of("B"));
 }
 
+TEST(ViewImages, OfAProjectThatWasMovedAreAllInTheNewPlace) {
+  const ScratchDirectory scratch;
+  const auto table = [&](const std::string& folder) {
+    return "data_t\nloop_\n_rlnMicrographName #1\n_rlnTomoYTilt #2\n_rlnTomoZRot #3\n"
+           "_rlnTomoXShiftAngst #4\n_rlnTomoYShiftAngst #5\n" +
+           folder + "/Motion/a.mrc 0 0 0 0\n" + folder + "/Motion/b.mrc 3 0 0 0\n";
+  };
+  for (const char* name : {"Motion/a.mrc", "Motion/b.mrc"}) stack(scratch / "new" / name, 1, 1.0f);
+  const auto list = scratch.write("new/TS.star", table((scratch / "old").string()));
+  const auto first = [&] { return find_view_images(read_view_table(list)).front().file; };
+  EXPECT_EQ(first(), scratch / "new/Motion/a.mrc");
+  stack(scratch / "old/Motion/b.mrc", 1, 2.0f);
+  expect_parts(message_of<Error>([&] { first(); }), {"TS.star", "row 2", "row 1", "of one place"});
+  stack(scratch / "old/Motion/a.mrc", 1, 2.0f);
+  EXPECT_EQ(first(), scratch / "old/Motion/a.mrc");
+}
+
 TEST(ViewImages, WhoseTiltAxesDifferSaySo) {
   const ScratchDirectory scratch;
   const auto image = [&](const char* name, const char* axis) {
