@@ -235,10 +235,8 @@ std::string mask_text(const output::MaskedViews& masked) {
   else if (masks.bead_masking == tilt_series::BeadMasking::kMasked)
     text += fmt::format("{} were found and masked", describe_beads(masks));
   else
-    text += fmt::format(
-        "{} were found and kept (blue), because no trial was surely better without "
-        "them",
-        describe_beads(masks));
+    text += fmt::format("{} were found and kept (blue), because no trial without them was as good",
+                        describe_beads(masks));
   return text + fmt::format("; {} hot or dead pixels; {:.1f} % of all pixels are masked.",
                             masks.num_bad_pixels, 100 * masked.mean_part());
 }

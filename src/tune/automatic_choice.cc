@@ -197,9 +197,7 @@ TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings&
   TrialSettings corrected = chosen;
   corrected.fits_view_scale =
       trials.first_as_good({unscaled, chosen}, kClearErrors).fits_view_scale;
-  if (open.beads)
-    corrected.masks_beads =
-        is_surely_better(trials.trial(chosen).score, trials.trial(unmasked).score);
+  corrected.masks_beads = trials.first_as_good({chosen, unmasked}, kClearErrors).masks_beads;
   return corrected;
 }
 

@@ -49,10 +49,11 @@ TrialSettings choose_variation(const TrialSettings& start, FitTrials& trials);
 TrialSettings choose_spike_rank(const TrialSettings& start, FitTrials& trials);
 
 /// Chooses the corrections of the views that are open, each by trials that differ in it alone.
-/// Scales are fitted if that is clearly better. Beads are masked if that predicts better by three
-/// standard errors and by 1 %: where it does not, they may be particles that are the specimen, and
-/// a tomogram without these is empty (docs/results/masks.md). Of the background, trials subtract
-/// half, and all of it if that is better; the part that is subtracted is interpolated between them.
+/// Scales are fitted if that is clearly better. Beads are masked unless a fit to them is clearly
+/// better: they were found because they clearly are beads, few trials show how they streak, and
+/// particles that are the specimen help to predict what is around them. Of the background, trials
+/// subtract half, and all of it if that is better; the part that is subtracted is interpolated
+/// between them.
 TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings& open,
                                  FitTrials& trials);
 

@@ -117,29 +117,19 @@ TEST(ChoosePrior, TakesTheLearnedOneIfItLowersTheErrorOfHeldOutViews) {
   EXPECT_EQ(chosen_if_learned_is(1.0), Prior::kTv);
 }
 
-TEST(ChooseCorrections, FitsScalesIfThatIsBetter) {
+TEST(ChooseCorrections, FitsScalesIfThatIsBetterAndMasksBeadsUnlessThatIsWorse) {
   const OpenSettings open{.view_scale = true, .beads = true};
-  const auto fits_scale = [&](double error_without) {
-    FitTrials trials = trials_with(
-        [=](const TrialSettings& s) { return s.fits_view_scale ? 1.0 : error_without; });
-    const TrialSettings chosen = choose_corrections(kStart, open, trials);
-    EXPECT_EQ(trials.made().size(), 3u);
-    return chosen.fits_view_scale;
-  };
-  EXPECT_TRUE(fits_scale(1.2));
-  EXPECT_FALSE(fits_scale(1.0));
-}
-
-TEST(ChooseCorrections, MasksBrightBeadsOnlyIfThatIsSurelyBetter) {
-  const auto masks_if_kept_are = [](double error) {
-    FitTrials trials =
-        trials_with([=](const TrialSettings& s) { return s.masks_beads ? 1.0 : error; });
-    return choose_corrections(kStart, {.beads = true}, trials).masks_beads;
-  };
-  EXPECT_TRUE(masks_if_kept_are(1.2));
-  EXPECT_FALSE(masks_if_kept_are(1.005)) << "a smaller gain may be of particles";
-  EXPECT_FALSE(masks_if_kept_are(1.0)) << "a tie";
-  EXPECT_FALSE(masks_if_kept_are(0.9));
+  const auto scales_help = [](const TrialSettings& s) { return s.fits_view_scale ? 1.0 : 1.2; };
+  FitTrials scales = trials_with(scales_help);
+  TrialSettings chosen = choose_corrections(kStart, open, scales);
+  EXPECT_TRUE(chosen.fits_view_scale);
+  EXPECT_TRUE(chosen.masks_beads);
+  const auto masks_harm = [](const TrialSettings& s) { return s.masks_beads ? 1.2 : 1.0; };
+  FitTrials masks = trials_with(masks_harm);
+  chosen = choose_corrections(kStart, open, masks);
+  EXPECT_FALSE(chosen.fits_view_scale);
+  EXPECT_FALSE(chosen.masks_beads);
+  EXPECT_EQ(masks.made().size(), 3u);
 }
 
 TEST(ChooseCorrections, LeaveWhatIsNotOpenAsItIs) {
