@@ -43,8 +43,7 @@ void write_relion_alignment(const tilt_series::PlannedSeries& series,
   const std::optional<fs::path> path = relion_alignment(options);
   if (!path) return;
   const io::ViewTable listed = io::read_relion_views(options.files.stack);
-  const double pixel_size_A =
-      series.options().listed_pixel_size_A.value_or(series.pixel_size_A() / series.bin_factor());
+  const double pixel_size_A = series.plan().listed_pixel_size_A;
   const double axis_px = output::tilt_axis(series, options.specimen).from_middle_px;
   std::vector<std::size_t> sections;
   for (const tilt_series::View& view : series.views())

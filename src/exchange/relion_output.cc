@@ -57,7 +57,7 @@ bool are_views_elsewhere(const options::ReconstructOptions& options) {
 
 // Says whether the table's size of a pixel is not the one that is used.
 bool are_pixels_others(const options::ReconstructOptions& options) {
-  const auto stated_A = tilt_series::replaced_pixel_size_A(options.settings);
+  const auto stated_A = tilt_series::project_pixel_size_A(options.settings);
   return stated_A && stated_A != options.views.pixel_size_A;
 }
 

@@ -138,7 +138,8 @@ void read_relion_project(Project& project) {
                     "defocus changes with the height as it is",
                     star.string(), tomogram.name, *tomogram.defocus_slope));
   if (tomogram.pixel_size_A) {
-    warn_of_other_pixels(project, views, star, *tomogram.pixel_size_A);
+    if (!project.request().pixel_size_A)
+      warn_of_other_pixels(project, views, star, *tomogram.pixel_size_A);
     project.set("--pixel-size", fmt::format("{}", *tomogram.pixel_size_A), star,
                 "rlnTomoTiltSeriesPixelSize");
   }

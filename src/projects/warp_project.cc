@@ -21,7 +21,7 @@ double set_pixel_size(Project& project, const io::ViewTable& table) {
   if (!stated_A || project.ignores(kEntry)) return in_header_A;
   const bool is_known = io::is_known_size(in_header_A);
   // Beside a contrast transfer, the size for which its defocus holds is compared there.
-  if (!is_known || !io::has_defocus(table))
+  if (!is_known || !(io::has_defocus(table) || project.request().pixel_size_A))
     set_stated_pixel_size(project, {table.file, kEntry, *stated_A}, in_header_A);
   return is_known ? in_header_A : *stated_A;
 }

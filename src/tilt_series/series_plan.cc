@@ -269,6 +269,14 @@ void require_compatible(const TiltSeriesOptions& options) {
   }
 }
 
+/// Returns the size of the pixels by which a table of views states shifts in Å: the project's, or
+/// that of the images. One that somebody gives (--pixel-size) leaves the views where they are.
+double listed_pixel_size_A(const TiltSeriesOptions& options, const io::MrcHeader& header,
+                           double used_A) {
+  if (options.listed_pixel_size_A) return *options.listed_pixel_size_A;
+  return io::is_known_size(header.voxel_size_A[0]) ? header.voxel_size_A[0] : used_A;
+}
+
 void require_no_axis_beside(const TiltSeriesOptions& options,
                             const std::optional<SectionTable>& table) {
   if (!options.tilt_axis_deg || !table || table->is_nominal) return;
@@ -310,17 +318,15 @@ void correct(const geometry::ViewCorrection& correction, PlannedView& planned) {
 
 }  // namespace
 
-std::optional<double> replaced_pixel_size_A(std::span<const Setting> settings) {
-  const auto replaced = std::ranges::find_if(settings, [](const Setting& setting) {
-    return setting.option == "--pixel-size" && !setting.instead.empty();
-  });
-  return replaced == settings.end() ? std::nullopt
-                                    : std::optional<double>(io::parse_number(replaced->value));
+std::optional<double> project_pixel_size_A(std::span<const Setting> settings) {
+  const auto stated = std::ranges::find(settings, "--pixel-size", &Setting::option);
+  return stated == settings.end() ? std::nullopt
+                                  : std::optional<double>(io::parse_number(stated->value));
 }
 
 TiltSeriesOptions series_options(const SeriesFiles& files, const Options& options) {
   TiltSeriesOptions series{files, options.views};
-  series.listed_pixel_size_A = replaced_pixel_size_A(options.settings);
+  series.listed_pixel_size_A = project_pixel_size_A(options.settings);
   series.resample = options.fit.engine == Engine::kSlab;
   series.starts_raw = options.run.align == Alignment::kFull;
   series.applies_local = series.resample && options.run.align == Alignment::kOff;
@@ -353,12 +359,12 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
   const auto mdoc = options.mdoc ? std::optional(io::read_mdoc(*options.mdoc)) : std::nullopt;
   SeriesPlan plan;
   plan.pixel_size_A = find_pixel_size(options, stack, mdoc);
-  const double listed_A = options.listed_pixel_size_A.value_or(plan.pixel_size_A);
-  const auto table = find_section_table(options, stack, listed_A);
+  plan.listed_pixel_size_A = listed_pixel_size_A(options, header, plan.pixel_size_A);
+  const auto table = find_section_table(options, stack, plan.listed_pixel_size_A);
   require_no_axis_beside(options, table);
   const TiltAngles angles = find_tilt_angles(options, stack, table, mdoc);
   const std::vector<double> x_tilts_deg = find_x_tilts(options, stack, table);
-  const ReplacedTable replaced(options, stack, table, listed_A);
+  const ReplacedTable replaced(options, stack, table, plan.listed_pixel_size_A);
   auto excluded = io::parse_section_list(options.exclude, header.nz);
   replaced.exclude_unused(excluded);
 

@@ -25,7 +25,7 @@ struct TiltSeriesOptions : SeriesFiles, ViewOptions {
   bool starts_raw = false;
   /// False: local alignments of files are left out, as for views that will be aligned.
   bool applies_local = true;
-  /// The pixels by which a table of a project states shifts in Å, where --pixel-size says others.
+  /// The size of a pixel that the files of a project state (project_pixel_size_A()).
   std::optional<double> listed_pixel_size_A = {};
   /// Takes decoded views that do not fit in memory; empty: the system's folder for such files.
   std::filesystem::path scratch_dir = {};
@@ -36,8 +36,8 @@ struct TiltSeriesOptions : SeriesFiles, ViewOptions {
   std::vector<std::int64_t> left_out = {};
 };
 
-/// Returns the size of a pixel that the files of a project state, if another one is given.
-std::optional<double> replaced_pixel_size_A(std::span<const Setting> settings);
+/// Returns the size of a pixel that the files of a project state, also if another one is given.
+std::optional<double> project_pixel_size_A(std::span<const Setting> settings);
 
 /// Returns how a tilt series is read. Views stay as they were recorded for the ray engine. Scratch
 /// files go beside the output, if there is one.
@@ -70,7 +70,8 @@ struct SeriesPlan {
   bool is_raw = false;             ///< the files align a raw stack; else it is aligned already
   std::int64_t aligned_width = 0;  ///< unbinned pixels
   std::int64_t aligned_height = 0;
-  double pixel_size_A = 1.0;  ///< of an unbinned pixel
+  double pixel_size_A = 1.0;         ///< of an unbinned pixel
+  double listed_pixel_size_A = 1.0;  ///< of the pixels by which a table states shifts in Å
   double bin_factor = 1.0;
   std::string angle_source;        ///< for messages: a file name, or the stack's header
   std::optional<StatedAxis> axis;  ///< by which views are turned, if no alignment is given

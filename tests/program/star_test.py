@@ -191,6 +191,18 @@ def test_shifts_count_in_the_pixels_of_the_project(relion):
     assert os.path.exists(output[:-4] + ".star"), "the pixels are those of the project"
 
 
+def test_shifts_of_warp_count_in_the_pixels_of_its_averages(series):
+    folder = harness.fresh_directory("warp_pixels")
+    for table in star_projects.write_warp(folder, series):
+        volumes = []
+        for options in ([], ["--pixel-size", 1.25 * PIXEL_SIZE]):
+            output = os.path.join(folder, "out.mrc")
+            harness.succeed("baseline", "wbp", table, "-o", output, "--overwrite", "--contrast", "bright",
+                            "--ctf", "none", "--thickness", THICKNESS, *options)
+            volumes.append(harness.read_volume(output))
+        assert agreement(*volumes) > 0.9999, table
+
+
 def test_names_in_a_row_begin_in_the_projects_folder(relion):
     """A run may start elsewhere, and write there."""
     outside = harness.fresh_directory("relion_outside")
