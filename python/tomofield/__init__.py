@@ -17,7 +17,8 @@ from ._core import Error, Progress, VolumeScores, __version__
 from ._projects import Project, Setting, open_project
 from ._records import Record, read_metrics, read_record
 from ._runs import Reconstruction, align, baseline, denoise, reconstruct
-from ._volumes import Box, Model, Tomogram, _origins, _own_voxel_size, _voxel_size, export, read_mrc, write_mrc
+from ._volumes import (Box, Model, Tomogram, _origins, _own_voxel_size, _voxel_size, export, read_mrc,
+                       write_mrc)
 from .options import Options
 
 __all__ = ["Box", "Error", "Model", "Options", "Progress", "Project", "Reconstruction", "Record",

@@ -235,7 +235,7 @@ def write_mrc(path: Path, volume: npt.ArrayLike, voxel_size_A: Optional[float] =
     voxel_size_A: side of a voxel in Å, which an array needs and a Tomogram has.
     """
     size, file = _voxel_size(voxel_size_A, volume), path_of(path, "the output")
-    origin = volume.origin_A if isinstance(volume, Tomogram) else (0.0, 0.0, 0.0)
+    (origin,) = _origins(volume)
     _core.write_mrc(array_of(volume), size, origin, file, switch_of(overwrite, "overwrite"))
 
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string_view>
 
 #include "base/log.h"
 #include "compare/grid.h"
@@ -14,11 +15,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::string_view kState = ".row.json";
+
 // Returns the files of the run, and those in which the comparison keeps its state and all that it
 // said.
 output::OutputPaths paths_of(const Row& row) { return output::output_paths(row.volume); }
-constexpr const char* kState = ".row.json";
-
 fs::path state_of(const Row& row) { return fs::path(row.volume).replace_extension(kState); }
 fs::path log_of(const Row& row) { return fs::path(row.volume).replace_extension(".log"); }
 
@@ -101,8 +102,7 @@ void claim_rows(std::vector<Row>& rows) {
 
 std::string run_of_state(const fs::path& file) {
   const std::string name = file.filename().string();
-  return name.ends_with(kState) ? name.substr(0, name.size() - std::string_view(kState).size())
-                                : "";
+  return name.ends_with(kState) ? name.substr(0, name.size() - kState.size()) : "";
 }
 
 bool is_done(const Row& row) {

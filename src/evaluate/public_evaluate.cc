@@ -41,8 +41,7 @@ void warn_of_places(const Tomogram& first, const char* first_name, const Tomogra
     return;
   base::log_warning(
       fmt::format("the {} begins {:.4g}, {:.4g}, {:.4g} voxels after the {} (origin_A): compared "
-                  "voxel by voxel "
-                  "all the same",
+                  "voxel by voxel all the same",
                   second_name, apart[0], apart[1], apart[2], first_name));
 }
 

@@ -47,9 +47,7 @@ Place place_of(const io::MrcHeader& header, VolumeAxes axes, double thickness_A)
 json section_json(const tilt_series::PlannedSeries& series, std::size_t index,
                   const SpecimenOptions& specimen, double axis_from_middle_px) {
   const tilt_series::View& view = series.views()[index];
-  const geometry::RawFromAligned m = series.raw_from_aligned(index)
-                                         .binned(1.0 / series.bin_factor())
-                                         .counted_from(axis_from_middle_px);
+  const geometry::RawFromAligned m = output::map_from_axis(series, index, axis_from_middle_px);
   return {{"z_index", view.section},
           {"tilt_angle", specimen.hand * view.tilt_deg},
           {"volume_x_rotation", specimen.hand * view.x_tilt_deg},

@@ -24,8 +24,7 @@ namespace {
 tilt_series::AlignedSection aligned_section(const tilt_series::PlannedSeries& series,
                                             std::size_t view, double axis_px) {
   const tilt_series::View& seen = series.views()[view];
-  const geometry::RawFromAligned map =
-      series.raw_from_aligned(view).binned(1.0 / series.bin_factor()).counted_from(axis_px);
+  const geometry::RawFromAligned map = output::map_from_axis(series, view, axis_px);
   return {seen.tilt_deg, seen.x_tilt_deg, map.rotation_rad() * 180.0 / std::numbers::pi, map, 0};
 }
 

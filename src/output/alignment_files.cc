@@ -158,6 +158,11 @@ TiltAxis tilt_axis(const PlannedSeries& series, const SpecimenOptions& specimen)
           .thickness_px = bin * axis.thickness};
 }
 
+RawFromAligned map_from_axis(const PlannedSeries& series, std::size_t view,
+                             double axis_from_middle_px) {
+  return unbinned_map(series, view).counted_from(axis_from_middle_px);
+}
+
 void write_alignment_files(const PlannedSeries& series, const std::array<std::int64_t, 3>& raw_size,
                            const AlignmentFiles& files, double axis_from_middle_px) {
   const std::vector<View>& views = series.views();
@@ -166,7 +171,7 @@ void write_alignment_files(const PlannedSeries& series, const std::array<std::in
                                    rotation(mean_rotation_rad(series)));
   for (std::size_t view = 0; view < views.size(); ++view)
     maps[static_cast<std::size_t>(views[view].section)] =
-        unbinned_map(series, view).counted_from(axis_from_middle_px);
+        map_from_axis(series, view, axis_from_middle_px);
   write_imod_files(views, maps, files);
   if (has_mirrored_views(series)) {
     base::log_warning(fmt::format("'{}' is not written: AreTomo's format has no mirrored views",

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <vector>
 
+#include "geometry/raw_from_aligned.h"
 #include "tilt_series/planned_series.h"
 #include "tomofield/options.h"
 
@@ -29,6 +31,10 @@ struct TiltAxis {
 
 /// Returns the tilt axis of a fit to this series.
 TiltAxis tilt_axis(const tilt_series::PlannedSeries& series, const SpecimenOptions& specimen);
+
+/// Returns the map of a view in pixels before binning, for places that count from the tilt axis.
+geometry::RawFromAligned map_from_axis(const tilt_series::PlannedSeries& series, std::size_t view,
+                                       double axis_from_middle_px);
 
 /// Writes how a series is aligned, as IMOD and AreTomo have it (docs/geometry.md). `raw_size` are
 /// the width and the height of the recorded views before binning, in pixels, and the number of
